@@ -1,0 +1,74 @@
+"""Every error that mvcodec raises on purpose: one tree, messages of one line.
+
+A message names the thing, the value found and what was expected. The command line turns
+`SettingError` into exit code 2 and every other `MvCodecError` into exit code 1.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class MvCodecError(Exception):
+    """Base of all errors raised on purpose by mvcodec."""
+
+
+class SettingError(MvCodecError, ValueError):
+    """A setting (an option, a configuration field) has a value that is not allowed.
+
+    Args:
+        setting: name as the user wrote it, e.g. ``--qp`` or ``EncoderConfig.qp``.
+        found: the offending value.
+        expected: what would have been accepted.
+    """
+
+    def __init__(self, setting: str, found: object, expected: str) -> None:
+        super().__init__(f"{setting}: found {found!s}, expected {expected}")
+        self.setting, self.found, self.expected = setting, found, expected
+
+
+class InputError(MvCodecError):
+    """Something that was read (a file, a folder, a stream) is not what it must be.
+
+    Args:
+        source: path or name of what was read.
+        found: what is there.
+        expected: what was expected.
+    """
+
+    def __init__(self, source: str | Path, found: object, expected: str) -> None:
+        super().__init__(f"{source}: found {found!s}, expected {expected}")
+        self.source, self.found, self.expected = str(source), found, expected
+
+
+class StreamError(InputError):
+    """A coded stream (container, header or packet) is damaged or not ours."""
+
+
+class OutputError(MvCodecError):
+    """Something could not be written.
+
+    Args:
+        target: path of what was to be written.
+        reason: why not, in the system's words.
+    """
+
+    def __init__(self, target: str | Path, reason: object) -> None:
+        super().__init__(f"{target}: cannot be written: {reason!s}")
+        self.target, self.reason = str(target), reason
+
+
+class StreamClosed(MvCodecError):
+    """`push` was called on a stage that has been flushed or closed."""
+
+
+class MissingExtra(MvCodecError):
+    """An optional package is not installed.
+
+    Args:
+        package: what is missing.
+        extra: the extra of mvcodec that brings it.
+    """
+
+    def __init__(self, package: str, extra: str) -> None:
+        super().__init__(f"{package} is not installed; install it with: pip install 'mvcodec[{extra}]'")

@@ -1,0 +1,46 @@
+"""The extension points of matching: pairs of pictures, and whole arrays of real cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from mvcodec.array import CameraArray, Position
+from mvcodec.frames import DisparityMap, Picture
+
+
+class PairMatcher(Protocol):
+    """Matches a rectified pair. What a plug-in of one's own usually is; see `Pairwise`."""
+
+    def match_pair(
+        self, left: Picture, right: Picture, range_px: tuple[float, float]
+    ) -> tuple[DisparityMap, DisparityMap]:
+        """Disparity of both pictures of a horizontal pair.
+
+        Args:
+            left, right: uint8 (H, W, 3) RGB.
+            range_px: (lo, hi), px; may be negative.
+
+        Returns:
+            The maps of left and right, both in the sign of ALGORITHMS section 0: a pixel x of
+            the left one is at ``x - d`` in the right one, a pixel x of the right one at
+            ``x + d`` in the left one. `valid` is False where the two contradict each other;
+            every value is finite all the same (filled).
+        """
+        ...
+
+
+class Matcher(Protocol):
+    """Estimates one map for each real camera of an array. What the encoder calls."""
+
+    def match(
+        self, array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
+    ) -> dict[Position, DisparityMap]:
+        """Disparity of every real camera, for the baseline of one cell.
+
+        Args:
+            array: the geometry.
+            pictures: uint8 (H, W, 3) RGB by real camera.
+            range_px: (lo, hi) between neighbouring real cameras, px.
+        """
+        ...

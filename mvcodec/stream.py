@@ -1,0 +1,149 @@
+"""What crosses the wire: packets of tracks, and the header that explains them (see FORMAT.md)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from mvcodec.array import Calibration, CameraArray, Position
+from mvcodec.errors import SettingError, StreamError
+
+FORMAT_VERSION = 1
+
+
+class TrackKind(StrEnum):
+    """What a track carries."""
+
+    HEADER = "header"
+    TEXTURE = "video"
+    DISPARITY = "disparity"
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """One stream of packets: the header's, or a real camera's pictures or disparity maps."""
+
+    kind: TrackKind
+    camera: Position | None = None
+
+    @property
+    def topic(self) -> str:
+        """The topic of this track in the container, e.g. ``/camera/r00_c04/video``."""
+        if self.camera is None:
+            return "/mvcodec/header"
+        return f"/camera/{view_name(self.camera)}/{self.kind.value}"
+
+
+HEADER_TRACK = Track(TrackKind.HEADER)
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """One coded unit: an access unit of a video track, or a header as UTF-8 JSON.
+
+    Attributes:
+        index: frame number in the input.
+        time_ns: capture time, integer nanoseconds.
+        keyframe: decoding of the track can start here.
+    """
+
+    track: Track
+    index: int
+    time_ns: int
+    keyframe: bool
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class StreamHeader:
+    """Everything that a receiver must know; sent as a packet with each keyframe.
+
+    Attributes:
+        array: geometry, real cameras, calibration.
+        disparity_range_px: (lo, hi); code value 0 means lo, 255 means hi (linear).
+        codec: name of the video codec of all tracks.
+        first_frame: index in the input of the first coded frame.
+        settings: the encoder's settings, for the record (names and plain JSON values).
+    """
+
+    array: CameraArray
+    disparity_range_px: tuple[float, float]
+    codec: str = "h264"
+    first_frame: int = 0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        low, high = self.disparity_range_px
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise SettingError("disparity_range_px", [low, high], "lo < hi")
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """The video tracks: pictures of every real camera, then maps of every real camera."""
+        kinds = (TrackKind.TEXTURE, TrackKind.DISPARITY)
+        return tuple(Track(kind, camera) for kind in kinds for camera in self.array.real)
+
+    def to_json(self) -> bytes:
+        """UTF-8 JSON as FORMAT.md specifies it."""
+        array = asdict(self.array)
+        document = {
+            "format": "mvcodec",
+            "version": FORMAT_VERSION,
+            "codec": self.codec,
+            "array": array,
+            "disparity_range_px": list(self.disparity_range_px),
+            "first_frame": self.first_frame,
+            "settings": dict(self.settings),
+        }
+        return json.dumps(document, separators=(",", ":")).encode()
+
+    @classmethod
+    def from_json(cls, data: bytes, source: str = "header") -> StreamHeader:
+        """Parse what `to_json` wrote.
+
+        Raises:
+            StreamError: not a header, a damaged one, or one of a newer format version.
+        """
+        try:
+            document = json.loads(data)
+        except (ValueError, RecursionError) as error:
+            raise StreamError(source, f"a header that is not JSON ({error})", "mvcodec's header") from None
+        if not isinstance(document, dict) or document.get("format") != "mvcodec":
+            raise StreamError(source, "a header of another format", "mvcodec's header")
+        version = document.get("version")
+        if version != FORMAT_VERSION:
+            raise StreamError(source, f"format version {version}", f"version {FORMAT_VERSION}")
+        try:
+            return cls._from_document(document)
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise StreamError(source, f"a damaged header ({error})", "the fields of FORMAT.md") from None
+
+    @classmethod
+    def _from_document(cls, document: Mapping[str, Any]) -> StreamHeader:
+        array = dict(document["array"])
+        hint = array.pop("disparity_per_step_px")
+        return cls(
+            array=CameraArray(
+                calibration=Calibration(**array.pop("calibration")),
+                real_rows=tuple(int(row) for row in array.pop("real_rows")),
+                real_cols=tuple(int(col) for col in array.pop("real_cols")),
+                disparity_per_step_px=None if hint is None else (float(hint[0]), float(hint[1])),
+                **array,
+            ),
+            disparity_range_px=(
+                float(document["disparity_range_px"][0]),
+                float(document["disparity_range_px"][1]),
+            ),
+            codec=str(document["codec"]),
+            first_frame=int(document["first_frame"]),
+            settings=dict(document["settings"]),
+        )
+
+
+def view_name(position: Position) -> str:
+    """``r00_c04``: the name of a view in topics, frame ids and output folders."""
+    return f"r{position[0]:02d}_c{position[1]:02d}"

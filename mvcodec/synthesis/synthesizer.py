@@ -1,0 +1,22 @@
+"""The extension point: anything that renders a view of a decoded set is a Synthesizer."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from mvcodec.array import Viewpoint
+from mvcodec.frames import DecodedSet, RenderedView
+
+
+class Synthesizer(Protocol):
+    """Renders views. Implementations may keep what they prepared for the last decoded set."""
+
+    def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
+        """The view from `viewpoint` (in steps of the dense grid, within the real cameras' span).
+
+        On a real camera's place it is that camera's decoded picture, exactly.
+
+        Raises:
+            SettingError: the viewpoint lies outside the span of the real cameras.
+        """
+        ...
