@@ -72,3 +72,7 @@ class MissingExtra(MvCodecError):
 
     def __init__(self, package: str, extra: str) -> None:
         super().__init__(f"{package} is not installed; install it with: pip install 'mvcodec[{extra}]'")
+
+
+class MvCodecWarning(UserWarning):
+    """Something that the user should know, in one line; issued with `warnings.warn`."""
