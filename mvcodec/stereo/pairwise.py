@@ -1,0 +1,108 @@
+"""Disparity of every real camera of an array from a matcher of pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mvcodec.array import CameraArray, Position
+from mvcodec.frames import DisparityMap, Picture
+from mvcodec.stereo.fusion import fuse
+from mvcodec.stereo.matcher import PairMatcher
+
+THREADS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class CameraPair:
+    """Two neighbouring real cameras.
+
+    Attributes:
+        first: the left or the upper one.
+        second: the right or the lower one.
+        vertical: whether `second` stands below `first`.
+    """
+
+    first: Position
+    second: Position
+    vertical: bool
+
+
+def camera_pairs(array: CameraArray) -> tuple[CameraPair, ...]:
+    """Every pair of neighbouring real cameras, horizontal ones first."""
+    horizontal = [
+        CameraPair((row, left), (row, right), vertical=False)
+        for row in array.real_rows
+        for left, right in pairwise(array.real_cols)
+    ]
+    vertical = [
+        CameraPair((upper, col), (lower, col), vertical=True)
+        for upper, lower in pairwise(array.real_rows)
+        for col in array.real_cols
+    ]
+    return (*horizontal, *vertical)
+
+
+@dataclass(frozen=True, slots=True)
+class Pairwise:
+    """Matcher that matches all neighbouring pairs and fuses what each camera's partners say.
+
+    Attributes:
+        pair_matcher: of rectified pairs.
+        vertical: whether upper and lower neighbours are asked too. Without it an array of
+            more than one column is matched along its rows alone.
+    """
+
+    pair_matcher: PairMatcher
+    vertical: bool = True
+
+    def match(
+        self, array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
+    ) -> dict[Position, DisparityMap]:
+        """See `Matcher.match`. A lone camera's map is flat, at range_px[0], and nowhere valid."""
+        pairs = [
+            pair for pair in camera_pairs(array) if self.vertical or not pair.vertical or array.cols == 1
+        ]
+        candidates: dict[Position, list[DisparityMap]] = {position: [] for position in array.real}
+        with ThreadPoolExecutor(THREADS) as pool:
+            matched = pool.map(lambda pair: self._match(pair, array.cell_rho, pictures, range_px), pairs)
+            for pair, maps in zip(pairs, matched, strict=True):
+                candidates[pair.first].append(maps[0])
+                candidates[pair.second].append(maps[1])
+            fused = pool.map(lambda position: _fuse(candidates[position], array, range_px), candidates)
+            return dict(zip(candidates, fused, strict=True))
+
+    def _match(
+        self,
+        pair: CameraPair,
+        rho: float,
+        pictures: Mapping[Position, Picture],
+        range_px: tuple[float, float],
+    ) -> tuple[DisparityMap, DisparityMap]:
+        first, second = pictures[pair.first], pictures[pair.second]
+        if not pair.vertical:
+            return self.pair_matcher.match_pair(first, second, range_px)
+        upper, lower = self.pair_matcher.match_pair(
+            _transposed(first), _transposed(second), (range_px[0] * rho, range_px[1] * rho)
+        )
+        return _upright(upper, rho), _upright(lower, rho)
+
+
+def _transposed(picture: Picture) -> Picture:
+    return np.ascontiguousarray(picture.transpose(1, 0, 2))
+
+
+def _upright(disparity: DisparityMap, rho: float) -> DisparityMap:
+    values = np.ascontiguousarray(disparity.values_px.T) / np.float32(rho)
+    return DisparityMap(values, np.ascontiguousarray(disparity.valid.T))
+
+
+def _fuse(candidates: list[DisparityMap], array: CameraArray, range_px: tuple[float, float]) -> DisparityMap:
+    if candidates:
+        return fuse(candidates)
+    shape = array.height, array.width
+    return DisparityMap(np.full(shape, range_px[0], np.float32), np.zeros(shape, np.bool_))

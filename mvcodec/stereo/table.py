@@ -1,0 +1,26 @@
+"""The matchers by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from mvcodec.errors import SettingError
+from mvcodec.stereo.matcher import Matcher
+from mvcodec.stereo.pairwise import Pairwise
+from mvcodec.stereo.sgbm import Sgbm
+
+MATCHERS: dict[str, Callable[[], Matcher]] = {
+    "sgbm": lambda: Pairwise(Sgbm()),
+    "sgbm-h": lambda: Pairwise(Sgbm(), vertical=False),
+}
+
+
+def make_matcher(name: str) -> Matcher:
+    """The matcher of that name.
+
+    Raises:
+        SettingError: there is none.
+    """
+    if name not in MATCHERS:
+        raise SettingError("matcher", name, "one of " + ", ".join(MATCHERS))
+    return MATCHERS[name]()
