@@ -54,11 +54,11 @@ class LayerStack:
 
     Attributes:
         bounds_px: (d_min, d_max) of each layer, inclusive integers, farthest first.
-        labels: uint8 (H, W); 0 = occluded, i = bounds_px[i - 1].
+        labels: uint16 (H, W); 0 = occluded, i = bounds_px[i - 1].
     """
 
     bounds_px: tuple[tuple[int, int], ...]
-    labels: NDArray[np.uint8]
+    labels: NDArray[np.uint16]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

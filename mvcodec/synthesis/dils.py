@@ -1,0 +1,84 @@
+"""View synthesis by depth layers, as the thesis has it (DILS, 4.3.2.4 - 4.3.2.9).
+
+Each layer is one rigid plane: the right picture is moved onto the left one by the layer's average
+disparity (equation 4.15), masked (4.16), blended (4.17) and moved to the virtual camera (4.18); the layers
+are laid over each other, far to near (4.20). Occluded pixels (layer 0) are left out and their places filled
+along the row (4.3.2.9).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvcodec.array import Viewpoint
+from mvcodec.errors import SettingError
+from mvcodec.frames import DecodedSet, LayerStack, RenderedView
+from mvcodec.layers.dils import THRESHOLD, average_px
+from mvcodec.layers.table import LAYER_SPLITS
+from mvcodec.synthesis import mlvs
+from mvcodec.synthesis.mlvs import Route, View
+from mvcodec.synthesis.rows import forward_pair
+
+
+@dataclass(frozen=True, slots=True)
+class DilsSettings:
+    """Settings of DILS; the defaults are the thesis's.
+
+    Attributes:
+        split: how the map is split into layers, a name of LAYER_SPLITS.
+        threshold: T of the split (equation 4.9), pixels, 0 or more.
+        alpha: share of the left picture in the blend (4.17), 0..1.
+        fill_holes: False leaves holes black.
+        route: how level 3 of MLVS reaches the middle of a cell.
+
+    Raises:
+        SettingError: a setting is outside its range.
+    """
+
+    split: str = "runs"
+    threshold: int = THRESHOLD
+    alpha: float = 0.5
+    fill_holes: bool = True
+    route: Route = Route.UPPER_LOWER
+
+    def __post_init__(self) -> None:
+        if self.split not in LAYER_SPLITS:
+            raise SettingError("DilsSettings.split", self.split, f"one of {', '.join(LAYER_SPLITS)}")
+        if self.threshold < 0:
+            raise SettingError("DilsSettings.threshold", self.threshold, "0 or more pixels")
+        if not 0 <= self.alpha <= 1:
+            raise SettingError("DilsSettings.alpha", self.alpha, "0..1")
+
+
+class Dils:
+    """DILS through MLVS levels 1 - 3: a Synthesizer, and a PairSynthesizer for one pair."""
+
+    def __init__(self, settings: DilsSettings | None = None) -> None:
+        self.settings = settings or DilsSettings()
+
+    def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
+        """See `Synthesizer.render`; `disparity_px` is the pixels' own, not their layers' average."""
+        return mlvs.render(decoded, viewpoint, self, self.settings.route)
+
+    def synthesize_pair(self, left: View, right: View, beta: float, px_per_disparity: float) -> View:
+        """See `PairSynthesizer.synthesize_pair`. Shifts are whole px, halves rounded up."""
+        layers = LAYER_SPLITS[self.settings.split](left.disparity, self.settings.threshold)
+        return forward_pair(
+            left,
+            right,
+            shift_px=_shifts(layers, beta * px_per_disparity),
+            right_shift_px=_shifts(layers, px_per_disparity),
+            nearness=layers.labels.astype(np.float32),
+            usable=layers.labels > 0,
+            left_weight=self.settings.alpha,
+            fill_holes=self.settings.fill_holes,
+        )
+
+
+def _shifts(layers: LayerStack, px_per_disparity: float) -> NDArray[np.int32]:
+    by_layer = [math.floor(px_per_disparity * average_px(bounds) + 0.5) for bounds in layers.bounds_px]
+    return np.array([0, *by_layer], np.int32)[layers.labels]

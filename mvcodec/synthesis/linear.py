@@ -1,0 +1,65 @@
+"""Conventional linear interpolation between two views: the thesis's baseline (equation 4.4).
+
+A forward mapping with holes: left pixel x of disparity d goes to ``round(x - beta * d)``, nearest last,
+invalid pixels skipped, holes left black; its colour is ``(1 - beta) * L(x) + beta * R(x - d)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvcodec.array import MAX_PICTURE_SIDE, Viewpoint
+from mvcodec.frames import DecodedSet, FloatMap, RenderedView
+from mvcodec.synthesis import mlvs
+from mvcodec.synthesis.mlvs import Route, View
+from mvcodec.synthesis.rows import forward_pair
+
+
+@dataclass(frozen=True, slots=True)
+class LinearSettings:
+    """Settings of linear interpolation; the defaults are the thesis's.
+
+    Attributes:
+        fill_holes: True fills holes along the row, as DILS does.
+        route: how level 3 of MLVS reaches the middle of a cell.
+    """
+
+    fill_holes: bool = False
+    route: Route = Route.UPPER_LOWER
+
+
+class Linear:
+    """Linear interpolation through MLVS levels 1 - 3: a Synthesizer, and a PairSynthesizer for one pair."""
+
+    def __init__(self, settings: LinearSettings | None = None) -> None:
+        self.settings = settings or LinearSettings()
+
+    def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
+        """See `Synthesizer.render`."""
+        return mlvs.render(decoded, viewpoint, self, self.settings.route)
+
+    def synthesize_pair(self, left: View, right: View, beta: float, px_per_disparity: float) -> View:
+        """See `PairSynthesizer.synthesize_pair`."""
+        disparity = left.disparity
+        return forward_pair(
+            left,
+            right,
+            shift_px=_shifts(disparity.values_px, beta * px_per_disparity),
+            right_shift_px=_shifts(disparity.values_px, px_per_disparity),
+            nearness=disparity.values_px,
+            usable=disparity.valid,
+            left_weight=1 - beta,
+            fill_holes=self.settings.fill_holes,
+        )
+
+
+def _shifts(disparity_px: FloatMap, px_per_disparity: float) -> NDArray[np.int32]:
+    # Halves of the place x - shift are rounded up, hence halves of the shift down. A shift past the widest
+    # picture leads nowhere, whatever its size; cut there, it fits the integer.
+    limit = MAX_PICTURE_SIDE
+    exact = np.clip(disparity_px * np.float32(px_per_disparity), -limit, limit)
+    shifts: NDArray[np.int32] = np.ceil(exact - np.float32(0.5)).astype(np.int32)
+    return shifts
