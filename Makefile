@@ -1,0 +1,47 @@
+# make demo       the main job on the sample scene, into ./demo (INPUT=folder: on an array folder)
+# make test       lint, types, import rules, tests (under ten minutes on two cores)
+# make test-slow  the tests that take more than a minute each
+# make benchmark  quality and speed on DATA=folder (an array folder or a folder of them)
+# make lint       ruff, mypy, import-linter
+#
+# Each sets .venv up first where it is missing or older than pyproject.toml.
+
+PYTHON ?= $(firstword $(foreach name,python3 python3.14 python3.13 python3.12 python3.11 python,\
+	$(if $(shell $(name) -c 'import sys; print(sys.version_info >= (3, 11) or "")' 2>/dev/null),$(name))))
+VENV := .venv
+STAMP := $(VENV)/.installed
+BIN := $(VENV)/bin
+
+INPUT ?=
+OUT ?= demo
+DATA ?= ../shared/data
+
+NEEDS_PYTHON = $(if $(PYTHON),,$(error mvcodec needs Python 3.11 or newer; none found on PATH))
+NEEDS_VENV = $(if $(shell $(PYTHON) -c 'import sys, venv, ensurepip; print(sys.version_info >= (3, 11) or "")' 2>/dev/null),,\
+	$(error mvcodec needs Python 3.11 or newer with the venv module (Debian, Ubuntu: apt install python3-venv); $(PYTHON) is not))
+
+.PHONY: demo test test-slow benchmark lint
+
+demo: $(STAMP)
+	$(BIN)/python tools/demo.py $(if $(INPUT),--input "$(INPUT)") --out "$(OUT)"
+
+test: lint
+	$(BIN)/pytest -n 2 --dist loadfile -m "not slow"
+
+test-slow: $(STAMP)
+	$(BIN)/pytest -m slow
+
+benchmark: $(STAMP)
+	$(BIN)/python tools/benchmark.py --data "$(DATA)"
+
+lint: $(STAMP)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+$(STAMP): pyproject.toml
+	$(NEEDS_PYTHON)$(NEEDS_VENV)@$(PYTHON) -m venv $(VENV)
+	@echo "installing mvcodec and what it needs into $(VENV) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@

@@ -1,0 +1,87 @@
+"""Parsing that the commands share. Each parser raises what argparse turns into one line and exit code 2."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Sequence
+
+NEGATIVE_VALUES = ("--disparity-range", "--frames", "--view")
+"""Options whose value may begin with a minus sign."""
+
+
+def join_negative_values(argv: Sequence[str]) -> list[str]:
+    """Turn ``--frames -2:`` into ``--frames=-2:``, which argparse would take for an option."""
+    joined: list[str] = []
+    for argument in argv:
+        if joined and joined[-1] in NEGATIVE_VALUES and re.match(r"-[\d.]", argument):
+            joined[-1] += "=" + argument
+        else:
+            joined.append(argument)
+    return joined
+
+
+def pair_of_sizes(text: str) -> tuple[int, int]:
+    """``640x360`` or ``5x5`` as two positive integers."""
+    match = re.fullmatch(r"([1-9]\d{0,8})[xX]([1-9]\d{0,8})", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected two positive whole numbers such as 5x3")
+    return int(match[1]), int(match[2])
+
+
+def frame_slice(text: str) -> slice:
+    """``A:B`` as a Python slice; either end may be left out or negative."""
+    match = re.fullmatch(r"(-?\d{1,15})?:(-?\d{1,15})?", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(
+            f"found {text!r}, expected A:B, a Python slice such as 0:9, :9 or -2:"
+        )
+    start, stop = match[1], match[2]
+    return slice(None if start is None else int(start), None if stop is None else int(stop))
+
+
+def disparity_range(text: str) -> tuple[float, float] | str:
+    """``LO,HI`` in px, LO < HI, or ``auto``."""
+    if text == "auto":
+        return text
+    low, high = _two_numbers(text, "LO,HI in px with LO < HI, or auto")
+    if low >= high:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected LO < HI")
+    return low, high
+
+
+def view(text: str) -> tuple[float, float]:
+    """``ROW,COL`` in steps of the grid; fractions are legal."""
+    return _two_numbers(text, "ROW,COL such as 0,2 or 0.5,1.25")
+
+
+def positive_int(text: str) -> int:
+    """A whole number of at least 1."""
+    if not re.fullmatch(r"\d{1,9}", text) or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a whole number of at least 1")
+    return int(text)
+
+
+def _two_numbers(text: str, expected: str) -> tuple[float, float]:
+    try:
+        first, second = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected {expected}") from None
+    if not (math.isfinite(first) and math.isfinite(second)):
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected {expected}")
+    return first, second
+
+
+def add_frames(parser: argparse.ArgumentParser, what: str) -> None:
+    """``--frames A:B``."""
+    parser.add_argument(
+        "--frames", type=frame_slice, metavar="A:B", help=f"{what}, a Python slice (default: all)"
+    )
+
+
+def add_output_options(parser: argparse.ArgumentParser, json_help: str | None = None) -> None:
+    """``--quiet``, and ``--json`` where the command has a result that a program would want."""
+    parser.add_argument("--quiet", action="store_true", help="no progress bar, no summary")
+    if json_help is not None:
+        parser.add_argument("--json", action="store_true", help=json_help)

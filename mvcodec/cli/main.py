@@ -1,0 +1,112 @@
+"""The command line: finds the command, prints errors and warnings as one line each, sets the exit code."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Sequence
+from importlib import import_module
+from typing import NoReturn, TextIO
+
+import mvcodec
+from mvcodec.cli.arguments import join_negative_values
+from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
+
+COMMANDS: dict[str, str] = {
+    "sample": "render the sample scene as an array folder",
+    "encode": "code an array of pictures or videos into one MCAP file",
+    "decode": "decode a file and synthesise views from it",
+    "info": "say what a file holds",
+    "compare": "measure a decoded array against its original",
+}
+"""Name and purpose; each lives in mvcodec.cli.<name> as add_arguments(parser) and run(arguments)."""
+
+EXIT_FAILURE = 1
+EXIT_USAGE = 2
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """An argument parser that says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line and leave with exit code 2."""
+        self.exit(EXIT_USAGE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        argv: the arguments after the program's name; those of this process if None.
+
+    Returns:
+        0; 1 for bad input, bad output or Ctrl-C; 2 for a setting that is not allowed.
+
+    Raises:
+        SystemExit: from argparse, for --help (0) and arguments that don't parse (2).
+    """
+    arguments = sys.argv[1:] if argv is None else list(argv)
+    parsed = _parser(arguments).parse_args(join_negative_values(arguments))
+    with warnings.catch_warnings():
+        warnings.simplefilter("once", MvCodecWarning)
+        warnings.showwarning = _show_warning
+        return _run(parsed)
+
+
+def _run(parsed: argparse.Namespace) -> int:
+    try:
+        import_module(f"mvcodec.cli.{parsed.command}").run(parsed)
+        sys.stdout.flush()
+    except SettingError as error:
+        return _fail(error, EXIT_USAGE)
+    except (MvCodecError, OSError) as error:
+        if isinstance(error, BrokenPipeError):
+            # Whoever read our output has seen enough; without this, Python complains again at exit.
+            sys.stdout = None  # type: ignore[assignment]
+        return _fail(error, EXIT_FAILURE)
+    except KeyboardInterrupt:
+        return _fail("interrupted", EXIT_FAILURE)
+    return 0
+
+
+def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
+    parser = OneLineParser(prog="mvcodec", description=mvcodec.__doc__, allow_abbrev=False)
+    parser.add_argument("--version", action="version", version=f"mvcodec {mvcodec.__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, purpose in COMMANDS.items():
+        command = commands.add_parser(name, help=purpose, description=purpose, allow_abbrev=False)
+        # The options name the choices of the plug-in tables, whose import takes time: ask only the
+        # command that is meant.
+        if name in arguments:
+            import_module(f"mvcodec.cli.{name}").add_arguments(command)
+    return parser
+
+
+def _fail(error: object, code: int) -> int:
+    print("mvcodec: error:", _one_line(error), file=sys.stderr)
+    return code
+
+
+def _show_warning(  # noqa: PLR0917 - the signature of warnings.showwarning
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    text = f"mvcodec: warning: {_one_line(message)}"
+    if not issubclass(category, MvCodecWarning):
+        text = warnings.formatwarning(message, category, filename, lineno, line).rstrip()
+    from tqdm import tqdm  # noqa: PLC0415 - it keeps the line apart from a progress bar; --help needs none
+
+    tqdm.write(text, file=file or sys.stderr)
+
+
+def _one_line(message: object) -> str:
+    return " ".join(str(message).split())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

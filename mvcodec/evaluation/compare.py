@@ -1,0 +1,96 @@
+"""A decoded array against its original: frames paired by their number, views by their place."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from mvcodec.capture import ArraySource, resolve_frames
+from mvcodec.errors import InputError, MvCodecWarning
+from mvcodec.evaluation.quality import Comparison, QualityMeter
+
+THREADS = 2
+
+
+def compare(
+    original: ArraySource,
+    decoded: ArraySource,
+    frames: slice | None = None,
+    *,
+    on_frame: Callable[[], object] | None = None,
+) -> Comparison:
+    """Measure every view of a decoded array.
+
+    The decoded array says which of its views were coded; where it does not (an original), every
+    view counts as virtual.
+
+    Args:
+        frames: a range of the frames that both hold (a slice of step 1); all of them if None.
+        on_frame: called after each frame that was measured.
+
+    Raises:
+        InputError: the grids or the picture sizes differ, or no frame is in both.
+        SettingError: `frames` selects none.
+    """
+    first, count = _common_frames(original, decoded)
+    _check_equal(original, decoded)
+    chosen = resolve_frames(frames, count, decoded.name)
+    positions = decoded.array.positions
+    meter = QualityMeter(decoded.listed_real or ())
+    with ThreadPoolExecutor(THREADS) as pool:
+        for ours, theirs in zip(
+            original.frame_sets(_own_slice(original, first, chosen), positions),
+            decoded.frame_sets(_own_slice(decoded, first, chosen), positions),
+            strict=True,
+        ):
+            pictures = ([ours.pictures[view], theirs.pictures[view]] for view in positions)
+            list(pool.map(meter.push, positions, *zip(*pictures, strict=True)))
+            if on_frame is not None:
+                on_frame()
+    return meter.result()
+
+
+def common_frame_count(original: ArraySource, decoded: ArraySource) -> int:
+    """How many frames (by number) are in both.
+
+    Raises:
+        InputError: none.
+    """
+    return _common_frames(original, decoded)[1]
+
+
+def _common_frames(original: ArraySource, decoded: ArraySource) -> tuple[int, int]:
+    first = max(original.first_frame, decoded.first_frame)
+    end = min(_end(original), _end(decoded))
+    if first >= end:
+        found = f"frames {decoded.first_frame}..{_end(decoded) - 1}"
+        expected = f"some of the frames {original.first_frame}..{_end(original) - 1} of {original.name}"
+        raise InputError(decoded.name, found, expected)
+    if end - first < decoded.frame_count:
+        text = f"{decoded.name}: {decoded.frame_count - (end - first)} frames are not in {original.name}"
+        warnings.warn(text, MvCodecWarning, stacklevel=3)
+    return first, end - first
+
+
+def _end(source: ArraySource) -> int:
+    return source.first_frame + source.frame_count
+
+
+def _own_slice(source: ArraySource, first: int, chosen: range) -> slice:
+    start = first - source.first_frame
+    return slice(start + chosen.start, start + chosen.stop)
+
+
+def _check_equal(original: ArraySource, decoded: ArraySource) -> None:
+    ours, theirs = original.array, decoded.array
+    for what, expected, found in (
+        ("grid", (ours.rows, ours.cols), (theirs.rows, theirs.cols)),
+        ("pictures of", (ours.width, ours.height), (theirs.width, theirs.height)),
+    ):
+        if expected != found:
+            raise InputError(
+                decoded.name,
+                f"{what} {found[0]}x{found[1]}",
+                f"{what} {expected[0]}x{expected[1]} as in {original.name}",
+            )
