@@ -63,7 +63,7 @@ def _run(parsed: argparse.Namespace) -> int:
     except (MvCodecError, OSError) as error:
         if isinstance(error, BrokenPipeError):
             # Whoever read our output has seen enough; without this, Python complains again at exit.
-            sys.stdout = None  # type: ignore[assignment]
+            sys.stdout = None
         return _fail(error, EXIT_FAILURE)
     except KeyboardInterrupt:
         return _fail("interrupted", EXIT_FAILURE)
