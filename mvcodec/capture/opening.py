@@ -1,0 +1,162 @@
+"""Opens what the user named: an array folder, its `array.json`, or video files in row order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TypeVar
+
+from mvcodec.array import Calibration, CameraArray, Position
+from mvcodec.capture.manifest import MANIFEST_NAME, Manifest, ViewFiles, read_manifest
+from mvcodec.capture.selection import select_real
+from mvcodec.capture.source import ArraySource
+from mvcodec.capture.video_file import VideoView
+from mvcodec.capture.view_array import PictureView, ViewArray, ViewReader, check_views
+from mvcodec.errors import InputError, SettingError
+
+_OPENERS = 2
+_Files = TypeVar("_Files")
+_FPS_TOLERANCE = 1e-3
+
+
+def open_input(
+    paths: Sequence[Path], *, grid: tuple[int, int] | None = None, real: str = "corners"
+) -> ArraySource:
+    """Open an input; headers are read, no picture is decoded.
+
+    Args:
+        paths: one array folder (or its `array.json`), or rows * cols video files in row order.
+        grid: (rows, cols); needed for video files, must agree with an array folder.
+        real: which cameras are real: ``corners``, ``all``, ``every:K`` or ``R,R..xC,C..``.
+
+    Raises:
+        SettingError: `grid` or `real` doesn't fit the input.
+        InputError: something is missing, unreadable, malformed, or the views differ in size,
+            length or frame rate.
+    """
+    if not paths:
+        raise SettingError("INPUT", "nothing", "an array folder, or video files and --grid RxC")
+    for path in paths:
+        if not path.exists():
+            raise InputError(path, "nothing there", "an array folder or a video file")
+    if len(paths) == 1 and (paths[0].is_dir() or paths[0].suffix.lower() == ".json"):
+        return _open_folder(paths[0], grid, real)
+    return _open_videos(paths, grid, real)
+
+
+def _open_folder(path: Path, grid: tuple[int, int] | None, real: str) -> ViewArray:
+    manifest = read_manifest(_find_manifest(path))
+    if grid not in (None, (manifest.rows, manifest.cols)):
+        raise SettingError(
+            "--grid", _grid_text(grid), f"{manifest.rows}x{manifest.cols} as {manifest.path} says"
+        )
+    views = _open_views(manifest.views, _open_view)
+    fps = _common_fps(views) or manifest.fps
+    array = _folder_array(manifest, views[0, 0].size, fps, real)
+    count = views[0, 0].count
+    for position, files in manifest.truth.items():
+        if len(files.names) not in (1, count):
+            found = f"{len(files.names)} truth files for view {position[0]},{position[1]}"
+            raise InputError(manifest.path, found, f"1 or {count}, one for each frame")
+    return ViewArray(
+        str(path),
+        array,
+        views,
+        truth=manifest.truth,
+        first_frame=manifest.first_frame,
+        listed_real=manifest.real,
+    )
+
+
+def _find_manifest(path: Path) -> Path:
+    if not path.is_dir():
+        return path
+    manifest = path / MANIFEST_NAME
+    if manifest.is_file():
+        return manifest
+    try:
+        is_empty = not any(path.iterdir())
+    except OSError as error:
+        raise InputError(path, error.strerror or "an unreadable folder", "an array folder") from None
+    raise InputError(
+        path, "an empty folder" if is_empty else f"no {MANIFEST_NAME}", f"a folder with {MANIFEST_NAME}"
+    )
+
+
+def _folder_array(manifest: Manifest, size: tuple[int, int], fps: float, real: str) -> CameraArray:
+    real_rows, real_cols = select_real(real, manifest.rows, manifest.cols)
+    try:
+        return CameraArray(
+            rows=manifest.rows,
+            cols=manifest.cols,
+            width=size[0],
+            height=size[1],
+            fps=fps,
+            real_rows=real_rows,
+            real_cols=real_cols,
+            calibration=manifest.calibration or Calibration.nominal(*size),
+            rho=manifest.rho,
+            disparity_per_step_px=manifest.disparity_per_step_px,
+            name=manifest.name,
+        )
+    except SettingError as error:
+        raise InputError(manifest.path, f"{error.setting} = {error.found}", error.expected) from None
+
+
+def _open_videos(paths: Sequence[Path], grid: tuple[int, int] | None, real: str) -> ViewArray:
+    for path in paths:
+        if path.is_dir():
+            raise InputError(path, "a folder among several inputs", "video files only, or one array folder")
+    if grid is None:
+        raise SettingError("--grid", "nothing", f"RxC for {len(paths)} video files in row order")
+    rows, cols = grid
+    if rows < 1 or cols < 1 or rows * cols != len(paths):
+        raise SettingError("--grid", _grid_text(grid), f"RxC with R*C = {len(paths)}, the number of files")
+    files = {(row, col): paths[row * cols + col] for row in range(rows) for col in range(cols)}
+    views = _open_views(files, VideoView)
+    first = views[0, 0]
+    fps = _common_fps(views)
+    if not fps:
+        raise InputError(first.path, "no frame rate", "a video file that states one")
+    real_rows, real_cols = select_real(real, rows, cols)
+    width, height = first.size
+    calibration = Calibration.nominal(width, height)
+    array = CameraArray(
+        rows,
+        cols,
+        width,
+        height,
+        fps,
+        real_rows,
+        real_cols,
+        calibration,
+        name=first.path.resolve().parent.name,
+    )
+    return ViewArray(str(paths[0]) if len(paths) == 1 else f"{paths[0]} ... {paths[-1]}", array, views)
+
+
+def _open_views(
+    files: dict[Position, _Files], opener: Callable[[_Files], ViewReader]
+) -> dict[Position, ViewReader]:
+    with ThreadPoolExecutor(_OPENERS, "mvcodec-open") as pool:
+        views = dict(zip(files, pool.map(opener, files.values()), strict=True))
+    check_views(views)
+    return views
+
+
+def _open_view(files: ViewFiles) -> ViewReader:
+    return VideoView(files) if isinstance(files, Path) else PictureView(files)
+
+
+def _common_fps(views: dict[Position, ViewReader]) -> float | None:
+    """The frame rate of the views that are video files; None where none of them states one."""
+    rated = [view for view in views.values() if isinstance(view, VideoView) and view.fps > 0]
+    for view in rated:
+        if abs(view.fps - rated[0].fps) > _FPS_TOLERANCE * rated[0].fps:
+            raise InputError(view.path, f"{view.fps:g} frames/s", f"{rated[0].fps:g} as in {rated[0].path}")
+    return rated[0].fps if rated else None
+
+
+def _grid_text(grid: tuple[int, int] | None) -> str:
+    return "nothing" if grid is None else f"{grid[0]}x{grid[1]}"

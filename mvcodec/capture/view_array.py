@@ -1,0 +1,134 @@
+"""An array of views, each a sequence of picture files or a video file, read side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Protocol
+
+from mvcodec.array import CameraArray, Position
+from mvcodec.capture.pictures import picture_size, read_picture, wrong_size
+from mvcodec.capture.source import resolve_frames
+from mvcodec.capture.truth import TruthFiles
+from mvcodec.errors import InputError, SettingError
+from mvcodec.frames import DisparityMap, FrameSet, Picture
+
+_READERS = 2
+
+
+class ViewReader(Protocol):
+    """The pictures of one view. `path` names it in messages; `size` is (width, height) px."""
+
+    @property
+    def path(self) -> Path: ...
+
+    @property
+    def size(self) -> tuple[int, int]: ...
+
+    @property
+    def count(self) -> int: ...
+
+    def pictures(self, frames: range) -> Iterator[Picture]:
+        """uint8 (H, W, 3) RGB of consecutive frames, read as they are asked for."""
+        ...
+
+
+class PictureView:
+    """A view whose frames are picture files.
+
+    Raises:
+        InputError: the first one is missing or unreadable.
+    """
+
+    def __init__(self, paths: tuple[Path, ...]) -> None:
+        self._paths = paths
+        self.path = paths[0]
+        self.count = len(paths)
+        self.size = picture_size(paths[0])
+
+    def pictures(self, frames: range) -> Iterator[Picture]:
+        """See ViewReader; every picture must have the size of the first one."""
+        for frame in frames:
+            yield read_picture(self._paths[frame], self.size)
+
+
+class ViewArray:
+    """An ArraySource over view readers.
+
+    Args:
+        name: the input as the user wrote it.
+        array: geometry and real cameras.
+        views: a reader for every grid position, all of the same size and length
+            (see `check_views`).
+        truth: ground truth by view.
+        first_frame, listed_real: as in ArraySource.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        array: CameraArray,
+        views: Mapping[Position, ViewReader],
+        *,
+        truth: Mapping[Position, TruthFiles] | None = None,
+        first_frame: int = 0,
+        listed_real: tuple[Position, ...] | None = None,
+    ) -> None:
+        self.name, self.array = name, array
+        self.first_frame, self.listed_real = first_frame, listed_real
+        self.frame_count = views[0, 0].count
+        self._views, self._truth = views, dict(truth or {})
+
+    def frame_sets(
+        self, frames: slice | None = None, views: Collection[Position] | None = None
+    ) -> Iterator[FrameSet]:
+        """See ArraySource. The next frame set is read while the caller works on this one."""
+        numbers = resolve_frames(frames, self.frame_count, self.name)
+        chosen = self.array.real if views is None else tuple(views)
+        for position in chosen:
+            if position not in self._views:
+                grid = f"a view of the {self.array.rows}x{self.array.cols} grid"
+                raise SettingError("view", f"{position[0]},{position[1]}", grid)
+        return self._read(numbers, chosen)
+
+    def _read(self, numbers: range, positions: tuple[Position, ...]) -> Iterator[FrameSet]:
+        streams = {position: self._views[position].pictures(numbers) for position in positions}
+        with ThreadPoolExecutor(_READERS, "mvcodec-read") as pool:
+
+            def start() -> dict[Position, Future[Picture]]:
+                return {position: pool.submit(next, stream) for position, stream in streams.items()}
+
+            ahead = start()
+            try:
+                for number in numbers:
+                    # A view's pictures are read one after the other: its stream is finished with
+                    # this frame before it is asked for the next.
+                    pictures = {position: future.result() for position, future in ahead.items()}
+                    if number + 1 in numbers:
+                        ahead = start()
+                    index = self.first_frame + number
+                    yield FrameSet(index, round(index * 1e9 / self.array.fps), pictures)
+            finally:
+                for future in ahead.values():
+                    future.cancel()
+
+    def truth(self, view: Position, frame: int) -> DisparityMap | None:
+        """See ArraySource."""
+        files = self._truth.get(view)
+        return None if files is None else files.read(frame, (self.array.width, self.array.height))
+
+
+def check_views(views: Mapping[Position, ViewReader]) -> None:
+    """All views must have the size and the length of the first one.
+
+    Raises:
+        InputError: naming the first file that differs, and both values.
+    """
+    first = views[0, 0]
+    for position, view in views.items():
+        if view.size != first.size:
+            raise wrong_size(view.path, view.size, first.size)
+        if view.count != first.count:
+            found = f"{view.count} frames in view {position[0]},{position[1]}"
+            raise InputError(view.path, found, f"{first.count} frames as in the first view of the array")
