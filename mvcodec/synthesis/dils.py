@@ -8,7 +8,6 @@ along the row (4.3.2.9).
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,7 +64,7 @@ class Dils:
         return mlvs.render(decoded, viewpoint, self, self.settings.route)
 
     def synthesize_pair(self, left: View, right: View, beta: float, px_per_disparity: float) -> View:
-        """See `PairSynthesizer.synthesize_pair`. Shifts are whole px, halves rounded up."""
+        """See `PairSynthesizer.synthesize_pair`. Shifts are whole px, halves rounded to even."""
         layers = LAYER_SPLITS[self.settings.split](left.disparity, self.settings.threshold)
         return forward_pair(
             left,
@@ -80,5 +79,6 @@ class Dils:
 
 
 def _shifts(layers: LayerStack, px_per_disparity: float) -> NDArray[np.int32]:
-    by_layer = [math.floor(px_per_disparity * average_px(bounds) + 0.5) for bounds in layers.bounds_px]
+    # Halves go to the even shift: to one side, they would move the whole picture by a quarter px.
+    by_layer = [round(px_per_disparity * average_px(bounds)) for bounds in layers.bounds_px]
     return np.array([0, *by_layer], np.int32)[layers.labels]

@@ -1,7 +1,7 @@
 """Conventional linear interpolation between two views: the thesis's baseline (equation 4.4).
 
-A forward mapping with holes: left pixel x of disparity d goes to ``round(x - beta * d)``, nearest last,
-invalid pixels skipped, holes left black; its colour is ``(1 - beta) * L(x) + beta * R(x - d)``.
+A forward mapping with holes: left pixel x of disparity d goes to ``x - round(beta * d)``, nearest last,
+invalid pixels skipped, holes left black; its colour is ``(1 - beta) * L(x) + beta * R(x - round(d))``.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Linear:
         return mlvs.render(decoded, viewpoint, self, self.settings.route)
 
     def synthesize_pair(self, left: View, right: View, beta: float, px_per_disparity: float) -> View:
-        """See `PairSynthesizer.synthesize_pair`."""
+        """See `PairSynthesizer.synthesize_pair`. Shifts are whole px, halves rounded to even."""
         disparity = left.disparity
         return forward_pair(
             left,
@@ -57,9 +57,10 @@ class Linear:
 
 
 def _shifts(disparity_px: FloatMap, px_per_disparity: float) -> NDArray[np.int32]:
-    # Halves of the place x - shift are rounded up, hence halves of the shift down. A shift past the widest
-    # picture leads nowhere, whatever its size; cut there, it fits the integer.
+    # Halves go to the even shift: to one side, they would move the whole picture by a quarter px. A shift
+    # past the widest picture leads nowhere, whatever its size; cut there, it fits the integer.
     limit = MAX_PICTURE_SIDE
-    exact = np.clip(disparity_px * np.float32(px_per_disparity), -limit, limit)
-    shifts: NDArray[np.int32] = np.ceil(exact - np.float32(0.5)).astype(np.int32)
+    shifts: NDArray[np.int32] = np.rint(np.clip(disparity_px * px_per_disparity, -limit, limit)).astype(
+        np.int32
+    )
     return shifts
