@@ -1,0 +1,1 @@
+"""Room 8: pictures and video files out."""
