@@ -87,12 +87,13 @@ class Pairwise:
         if not pair.vertical:
             return self.pair_matcher.match_pair(first, second, range_px)
         upper, lower = self.pair_matcher.match_pair(
-            _transposed(first), _transposed(second), (range_px[0] * rho, range_px[1] * rho)
+            transposed(first), transposed(second), (range_px[0] * rho, range_px[1] * rho)
         )
         return _upright(upper, rho), _upright(lower, rho)
 
 
-def _transposed(picture: Picture) -> Picture:
+def transposed(picture: Picture) -> Picture:
+    """The picture with rows and columns swapped, so that a vertical pair becomes a horizontal one."""
     return np.ascontiguousarray(picture.transpose(1, 0, 2))
 
 

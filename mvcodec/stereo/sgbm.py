@@ -30,6 +30,7 @@ class SgbmSettings:
         p1, p2: penalties of a disparity step of one and of more, for each pixel of the block
             and each channel.
         prefilter_cap: the x-derivative is truncated to +- this.
+        uniqueness_percent: a match counts when every other one costs this much more.
         tolerance_px: of the left-right check.
         speckle_area_px: smaller consistent patches are dropped.
         median_size: final median, 0 (none), 3 or 5.
@@ -39,6 +40,7 @@ class SgbmSettings:
     p1: int = 8
     p2: int = 32
     prefilter_cap: int = 15
+    uniqueness_percent: int = 0
     tolerance_px: float = 1.0
     speckle_area_px: int = 60
     median_size: int = 5
@@ -50,6 +52,8 @@ class SgbmSettings:
             raise SettingError("sgbm.p1, sgbm.p2", f"{self.p1}, {self.p2}", "0 < p1 < p2 <= 128")
         if not 1 <= self.prefilter_cap <= 63:
             raise SettingError("sgbm.prefilter_cap", self.prefilter_cap, "1..63")
+        if not 0 <= self.uniqueness_percent < 100:
+            raise SettingError("sgbm.uniqueness_percent", self.uniqueness_percent, "0..99")
         if self.median_size not in (0, 3, 5):
             raise SettingError("sgbm.median_size", self.median_size, "0, 3 or 5")
 
@@ -68,15 +72,7 @@ class Sgbm:
         Raises:
             SettingError: the range goes beyond +-2000 px.
         """
-        low, high = range_px
-        if max(abs(low), abs(high)) > MAX_DISPARITY_PX:
-            raise SettingError(
-                "disparity range", f"{low:g}..{high:g}", f"within +-{MAX_DISPARITY_PX} px for matcher sgbm"
-            )
-        raw_left = self._one_direction(left, right, range_px)
-        # Seen in a mirror, the right camera is the left one, with the same signs.
-        mirrored = self._one_direction(_mirror(right), _mirror(left), range_px)
-        raw_right = (_mirror(mirrored[0]), _mirror(mirrored[1]))
+        raw_left, raw_right = self.raw_pair(left, right, range_px)
         settings = self.settings
         return cross_check(
             raw_left,
@@ -86,6 +82,23 @@ class Sgbm:
             speckle_area_px=settings.speckle_area_px,
             median_size=settings.median_size,
         )
+
+    def raw_pair(
+        self, left: Picture, right: Picture, range_px: tuple[float, float]
+    ) -> tuple[tuple[FloatMap, Mask], tuple[FloatMap, Mask]]:
+        """What StereoSGBM finds, unchecked: (values in px, where there is one) of left and right.
+
+        Raises:
+            SettingError: the range goes beyond +-2000 px.
+        """
+        low, high = range_px
+        if max(abs(low), abs(high)) > MAX_DISPARITY_PX:
+            raise SettingError(
+                "disparity range", f"{low:g}..{high:g}", f"within +-{MAX_DISPARITY_PX} px for matcher sgbm"
+            )
+        # Seen in a mirror, the right camera is the left one, with the same signs.
+        values, known = self._one_direction(_mirror(right), _mirror(left), range_px)
+        return self._one_direction(left, right, range_px), (_mirror(values), _mirror(known))
 
     def _one_direction(
         self, left: Picture, right: Picture, range_px: tuple[float, float]
@@ -111,6 +124,7 @@ class Sgbm:
             P2=settings.p2 * weight,
             disp12MaxDiff=-1,
             preFilterCap=settings.prefilter_cap,
+            uniquenessRatio=settings.uniqueness_percent,
             mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
         )
         counts = matcher.compute(*padded)[:, pad_left : pad_left + width]
