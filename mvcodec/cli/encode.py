@@ -1,0 +1,183 @@
+"""``mvcodec encode``: pictures or videos of a camera array in, one MCAP file out."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from mvcodec.array import CameraArray
+from mvcodec.capture import ArraySource, open_input, resolve_frames
+from mvcodec.cli.arguments import add_frames, add_output_options, disparity_range, pair_of_sizes
+from mvcodec.cli.info import document, summary
+from mvcodec.cli.interrupt import deferred_interrupt
+from mvcodec.cli.progress import progress
+from mvcodec.container import McapWriter, read_info
+from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
+from mvcodec.frames import FrameSet
+from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
+from mvcodec.stereo.table import MATCHERS
+from mvcodec.video.codec import PRESETS
+
+SUFFIX = ".mcap"
+
+OPTIONS = {
+    "qp": "--qp",
+    "crf": "--crf",
+    "bitrate_kbps": "--bitrate",
+    "disparity_qp": "--disparity-qp",
+    "gop": "--gop",
+    "matcher": "--matcher",
+    "preset": "--preset",
+}
+"""The encoder's settings as the user wrote them."""
+
+
+class Unfinished(MvCodecError):
+    """Encoding ended early; what was written is a proper file."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``encode``."""
+    default = EncoderConfig()
+    parser.add_argument(
+        "input",
+        type=Path,
+        nargs="+",
+        metavar="INPUT",
+        help="an array folder, or R*C videos in row order with --grid",
+    )
+    parser.add_argument("output", type=Path, metavar="OUT.mcap")
+    parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
+    parser.add_argument(
+        "--real",
+        default="corners",
+        metavar="corners|all|every:K|R,R..xC,C..",
+        help="the cameras to code (default: corners, or both ends of a linear array)",
+    )
+    rate = parser.add_mutually_exclusive_group()
+    rate.add_argument("--qp", type=int, metavar="N", help=f"constant QP, 1..51 (default: {default.qp})")
+    rate.add_argument("--crf", type=float, metavar="N", help="constant rate factor")
+    rate.add_argument(
+        "--bitrate", type=float, metavar="KBPS", help="kbit/s of the pictures and maps of all cameras"
+    )
+    parser.add_argument("--disparity-qp", type=int, metavar="N", help="QP of the disparity maps")
+    parser.add_argument(
+        "--gop", type=int, metavar="N", help="frames from keyframe to keyframe, at most one second's"
+    )
+    parser.add_argument(
+        "--matcher",
+        default=default.matcher,
+        metavar="NAME",
+        help=f"one of {', '.join(MATCHERS)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--preset",
+        default=default.preset,
+        metavar="NAME",
+        help=f"effort of x264, one of {', '.join(PRESETS)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--disparity-range",
+        type=disparity_range,
+        metavar="LO,HI|auto",
+        help="px between neighbouring real cameras; auto: estimated whatever the input states"
+        " (default: estimated within what it states)",
+    )
+    add_frames(parser, "frames of the input to code")
+    add_output_options(parser, "print what the file holds as JSON")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Encode; leaves no output where nothing was encoded, a proper one where something was."""
+    _check_output(arguments.output, arguments.input)
+    source = open_input(arguments.input, grid=arguments.grid, real=arguments.real)
+    chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
+    config = _config(source.array, arguments)
+    if not source.array.calibration.given:
+        text = (
+            f"{source.name}: no calibration given; nominal values stand in (f = picture width, 0.1 m a step)"
+        )
+        warnings.warn(text, MvCodecWarning, stacklevel=2)
+    range_px = _find_range(source, chosen, arguments.disparity_range)
+    _encode(source, chosen, replace(config, disparity_range_px=range_px), arguments)
+    info = read_info(arguments.output)
+    if arguments.json:
+        print(json.dumps(document(info)))
+    elif not arguments.quiet:
+        print(f"{arguments.output}: {summary(info)}")
+
+
+def _encode(source: ArraySource, chosen: range, config: EncoderConfig, arguments: argparse.Namespace) -> None:
+    writer = McapWriter(arguments.output)
+    try:
+        with (
+            deferred_interrupt() as interrupted,
+            writer,
+            Encoder(source.array, config) as encoder,
+            progress("encode", len(chosen), quiet=arguments.quiet) as bar,
+        ):
+            for frame_set in source.frame_sets(slice(chosen.start, chosen.stop)):
+                packets = encoder.push(frame_set)
+                if interrupted():
+                    raise KeyboardInterrupt
+                writer.push(packets)
+                bar.update()
+    except (MvCodecError, OSError, KeyboardInterrupt) as error:
+        held = writer.frame_count
+        if not held:
+            raise
+        reason = str(error) or "interrupted"
+        raise Unfinished(f"{reason}; {arguments.output} holds {held} of {len(chosen)} frame sets") from error
+
+
+def _check_output(output: Path, inputs: Sequence[Path]) -> None:
+    if output.resolve() in [path.resolve() for path in inputs]:
+        raise SettingError("OUT", output, "another file than INPUT")
+    if output.suffix.lower() != SUFFIX:
+        # It would most likely be the last INPUT, with OUT forgotten.
+        raise SettingError("OUT", output, f"a file name that ends in {SUFFIX}")
+    if output.is_dir():
+        raise OutputError(output, "it is a folder")
+    if not output.parent.is_dir():
+        raise OutputError(output, f"there is no folder {output.parent}")
+
+
+def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
+    """The settings, checked against the array before the time-consuming part begins."""
+    rates = {"qp": arguments.qp, "crf": arguments.crf, "bitrate_kbps": arguments.bitrate}
+    if all(value is None for value in rates.values()):
+        rates["qp"] = EncoderConfig().qp
+    try:
+        config = EncoderConfig(
+            **rates,
+            disparity_qp=arguments.disparity_qp,
+            gop=arguments.gop,
+            matcher=arguments.matcher,
+            preset=arguments.preset,
+        )
+        Encoder(array, config).flush()
+    except SettingError as error:
+        raise SettingError(OPTIONS.get(error.setting, error.setting), error.found, error.expected) from None
+    return config
+
+
+def _find_range(
+    source: ArraySource, chosen: range, option: tuple[float, float] | str | None
+) -> tuple[float, float]:
+    if isinstance(option, tuple):
+        return option
+    hint = None if option == "auto" else source.array.disparity_hint_px
+    return estimate_range(source.array, _samples(source, chosen), hint)
+
+
+def _samples(source: ArraySource, chosen: range) -> list[FrameSet]:
+    count = min(MAX_FRAMES, len(chosen))
+    numbers = {chosen[index * (len(chosen) - 1) // max(count - 1, 1)] for index in range(count)}
+    return [
+        frame_set for number in sorted(numbers) for frame_set in source.frame_sets(slice(number, number + 1))
+    ]

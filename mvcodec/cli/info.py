@@ -1,0 +1,58 @@
+"""``mvcodec info``: what a file holds."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from mvcodec.container import StreamInfo, read_info
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``info``."""
+    parser.add_argument("input", type=Path, metavar="IN.mcap")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Print what the file holds."""
+    info = read_info(arguments.input)
+    if arguments.json:
+        print(json.dumps(document(info)))
+        return
+    array, (low, high) = info.header.array, info.header.disparity_range_px
+    rows, cols = (",".join(map(str, axis)) for axis in (array.real_rows, array.real_cols))
+    print(f"{arguments.input}: {summary(info)}")
+    print(f"  grid         {array.rows} x {array.cols}, {array.width} x {array.height} px, {array.fps:g} fps")
+    print(f"  real         {len(array.real)} cameras: rows {rows}, cols {cols}")
+    print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras")
+    print(f"  calibration  {'given' if array.calibration.given else 'nominal (the input stated none)'}")
+    for name, bits in info.bits.items():
+        print(f"  {name:11}  {bits / 1000:.1f} kbit")
+
+
+def document(info: StreamInfo) -> dict[str, Any]:
+    """What ``info --json`` prints."""
+    array = info.header.array
+    return {
+        "grid": [array.rows, array.cols],
+        "real": [list(position) for position in array.real],
+        "frames": info.frames,
+        "fps": array.fps,
+        "size": [array.width, array.height],
+        "bits": dict(info.bits),
+        "disparity_range_px": list(info.header.disparity_range_px),
+        "calibration": "given" if array.calibration.given else "nominal",
+    }
+
+
+def summary(info: StreamInfo) -> str:
+    """One line: frame sets, bits, rate."""
+    array, bits = info.header.array, info.bits["total"]
+    rate = bits * array.fps / max(info.frames, 1)
+    return (
+        f"{info.frames} frame sets of {len(array.real)} cameras, {bits / 1000:.1f} kbit"
+        f" ({rate / 1000:.1f} kbit/s; maps {info.bits['disparity'] / bits:.0%})"
+    )

@@ -1,0 +1,187 @@
+"""How good and how fast: synthesis quality on real arrays, and speed against stock code in the same run.
+
+    python tools/benchmark.py --data DIR [--sets A,B] [--what quality|speed] [--matcher NAME]
+                              [--synthesizer NAME] [--json]
+
+DIR is an array folder or a folder of them. Quality: the corner cameras go in uncoded, the disparity range is
+estimated, every virtual view of frame 0 is rendered and its luma compared with the original's (of a 17 x 17
+grid every 4th row and column, of a 9 x 9 one the views whose row + col is divisible by 5). Speed: see
+speed_ratios.py beside this file. Without --what, both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from speed_ratios import RATIOS, measure_ratios
+
+from mvcodec.array import CameraArray, Position, Viewpoint
+from mvcodec.capture import ArraySource, open_input
+from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
+from mvcodec.evaluation.quality import QualityMeter
+from mvcodec.frames import DecodedSet
+from mvcodec.stereo.disparity_range import estimate_range
+from mvcodec.stereo.table import make_matcher
+from mvcodec.synthesis.synthesizer import Synthesizer
+from mvcodec.synthesis.table import make_synthesizer
+
+
+@dataclass(frozen=True, slots=True)
+class SetFigures:
+    """What one set gave; seconds are of one view, rendered alone."""
+
+    psnr_y: float
+    ssim: float
+    worst_psnr_y: float
+    seconds_per_view: float
+    matching_seconds: float
+    range_px: tuple[float, float]
+    views: int
+
+    def to_json(self) -> dict[str, float]:
+        """The form of ``--json``."""
+        names = ("psnr_y", "ssim", "worst_psnr_y", "seconds_per_view")
+        return {name: getattr(self, name) for name in names}
+
+
+def scored_views(array: CameraArray) -> list[Position]:
+    """The virtual views that count; a sample of them in the grids of 17 x 17 and 9 x 9."""
+    virtual = [view for view in array.positions if view not in array.real]
+    if (array.rows, array.cols) == (17, 17):
+        return [(row, col) for row, col in virtual if row % 4 == 0 and col % 4 == 0]
+    if (array.rows, array.cols) == (9, 9):
+        return [(row, col) for row, col in virtual if (row + col) % 5 == 0]
+    return virtual
+
+
+def measure_quality(source: ArraySource, matcher: str, synthesizer: Synthesizer) -> SetFigures:
+    """Match the uncoded corners of frame 0, render the scored views, compare them."""
+    array, views = source.array, scored_views(source.array)
+    (originals,) = source.frame_sets(slice(0, 1), [*array.real, *views])
+    pictures = {camera: originals.pictures[camera] for camera in array.real}
+    range_px = estimate_range(array, [originals], None)
+    started = time.perf_counter()
+    maps = make_matcher(matcher).match(array, pictures, range_px)
+    matching_seconds = time.perf_counter() - started
+    decoded = DecodedSet(array, originals.index, originals.time_ns, pictures, maps, range_px)
+    # The first view pays for compilation and for what the synthesizer keeps of a decoded set.
+    synthesizer.render(decoded, Viewpoint(*views[0]))
+    meter, render_seconds = QualityMeter(array.real), 0.0
+    for view in views:
+        started = time.perf_counter()
+        rendered = synthesizer.render(decoded, Viewpoint(*view))
+        render_seconds += time.perf_counter() - started
+        meter.push(view, originals.pictures[view], rendered.pixels)
+    result = meter.result()
+    psnr, ssim, worst = result.psnr_y.all, result.ssim.all, result.psnr_y.worst
+    if psnr is None or ssim is None or worst is None:
+        raise InputError(source.name, "no virtual view", "at least one")
+    return SetFigures(psnr, ssim, worst, render_seconds / len(views), matching_seconds, range_px, len(views))
+
+
+def find_sets(data: Path, names: Sequence[str] | None) -> dict[str, Path]:
+    """Array folders by name: `data` itself, or those right below it."""
+    if (data / "array.json").is_file():
+        found = {data.resolve().name: data}
+    else:
+        found = {path.parent.name: path.parent for path in sorted(data.glob("*/array.json"))}
+    if not found:
+        raise InputError(data, "no array.json in it or right below it", "an array folder or a folder of them")
+    unknown = [name for name in names or () if name not in found]
+    if unknown:
+        raise SettingError("--sets", ",".join(unknown), "some of " + ", ".join(found))
+    return {name: found[name] for name in names or found}
+
+
+def quality_table(sets: dict[str, ArraySource], arguments: argparse.Namespace) -> dict[str, Any]:
+    """Measure every set; a line for each as it is done."""
+    synthesizer = make_synthesizer(arguments.synthesizer)
+    figures = {}
+    say("set          Y-PSNR dB  worst   SSIM  s/view s match views  range px", arguments)
+    for name, source in sets.items():
+        result = measure_quality(source, arguments.matcher, synthesizer)
+        figures[name] = result.to_json()
+        low, high = result.range_px
+        say(
+            f"{name:12} {result.psnr_y:9.2f} {result.worst_psnr_y:6.2f} {result.ssim:6.4f}"
+            f" {result.seconds_per_view:7.3f} {result.matching_seconds:7.3f} {result.views:5}"
+            f"  {low:g}..{high:g}",
+            arguments,
+        )
+    return figures
+
+
+def speed_table(sets: dict[str, ArraySource], arguments: argparse.Namespace) -> dict[str, float]:
+    """Measure the ratios on the set that exercises most: a 2-D grid, then the most frames."""
+    name, source = max(
+        sets.items(), key=lambda item: (len(item[1].array.real) == 4, min(item[1].frame_count, 8))
+    )
+    say(f"speed on {name}, {source.array.width} x {source.array.height}", arguments)
+    ratios = {}
+    for what, (ours, theirs) in measure_ratios(source, arguments.matcher, arguments.synthesizer).items():
+        ratios[what] = ours / theirs
+        say(
+            f"{what:8} {ratios[what]:6.2f}  {ours * 1e3:9.2f} ms / {theirs * 1e3:9.2f} ms  {RATIOS[what]}",
+            arguments,
+        )
+    return ratios
+
+
+def say(line: str, arguments: argparse.Namespace) -> None:
+    """Tables go to standard output, or aside where JSON goes there."""
+    print(line, file=sys.stderr if arguments.json else sys.stdout, flush=True)
+
+
+def with_virtual_views(found: dict[str, Path], arguments: argparse.Namespace) -> dict[str, ArraySource]:
+    """Open the sets; leave those out that have nothing to synthesise, and say so."""
+    sets = {}
+    for name, path in found.items():
+        source = open_input([path])
+        if scored_views(source.array):
+            sets[name] = source
+        else:
+            say(
+                f"{name}: skipped, its {source.array.rows} x {source.array.cols} grid has no virtual view",
+                arguments,
+            )
+    if not sets:
+        raise InputError(arguments.data, "no set with a virtual view", "at least one")
+    return sets
+
+
+def main() -> int:
+    """Parse, measure, print."""
+    parser = argparse.ArgumentParser(description="Synthesis quality and speed of mvcodec.")
+    parser.add_argument("--data", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--sets", type=lambda text: text.split(","), metavar="A,B")
+    parser.add_argument("--what", choices=("quality", "speed"))
+    parser.add_argument("--matcher", default="sgbm")
+    parser.add_argument("--synthesizer", default="layered")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    warnings.simplefilter("ignore", MvCodecWarning)  # nominal calibration does not matter here
+    document: dict[str, Any] = {}
+    try:
+        sets = with_virtual_views(find_sets(arguments.data, arguments.sets), arguments)
+        if arguments.what != "speed":
+            document["sets"] = quality_table(sets, arguments)
+        if arguments.what != "quality":
+            document["ratios"] = speed_table(sets, arguments)
+    except MvCodecError as error:
+        print(f"benchmark: {error}", file=sys.stderr)
+        return 2 if isinstance(error, SettingError) else 1
+    if arguments.json:
+        print(json.dumps(document, indent=2))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
