@@ -21,8 +21,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from speed_ratios import RATIOS, measure_ratios
-
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture import ArraySource, open_input
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
@@ -121,6 +119,8 @@ def quality_table(sets: dict[str, ArraySource], arguments: argparse.Namespace) -
 
 def speed_table(sets: dict[str, ArraySource], arguments: argparse.Namespace) -> dict[str, float]:
     """Measure the ratios on the set that exercises most: a 2-D grid, then the most frames."""
+    from speed_ratios import RATIOS, measure_ratios  # noqa: PLC0415 - quality needs no codec
+
     name, source = max(
         sets.items(), key=lambda item: (len(item[1].array.real) == 4, min(item[1].frame_count, 8))
     )
