@@ -7,15 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from skimage import data
 from skimage.metrics import structural_similarity
+from small_arrays import photograph
 
 from mvcodec.errors import SettingError
 from mvcodec.evaluation.metrics import bad_pixel_rate, luma, psnr, psnr_saturated, ssim
-
-
-def photograph(name: str) -> NDArray[np.uint8]:
-    return np.asarray(getattr(data, name)(), np.uint8)
 
 
 def reference_ssim(picture: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:

@@ -13,7 +13,7 @@ from mvcodec.array import Viewpoint
 from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes, view
 from mvcodec.cli.progress import progress
 from mvcodec.cli.view_outputs import FORMATS, ViewGrid, check_output, make_output
-from mvcodec.container import read_info
+from mvcodec.container import McapReader
 from mvcodec.decoder import Decoder
 from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, Picture
@@ -104,5 +104,6 @@ def _frame_total(source: Path | BinaryIO, frames: slice | None) -> int | None:
     """How many frames the progress bar counts to; unknown where the input cannot be read twice."""
     if not isinstance(source, Path) or not sys.stderr.isatty():
         return None
-    count = read_info(source).frames
-    return len(range(*(frames or slice(None)).indices(count)))
+    with McapReader.open(source) as reader:
+        count = reader.frame_count
+    return None if count is None else len(range(*(frames or slice(None)).indices(count)))

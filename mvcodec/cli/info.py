@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"  real         {len(array.real)} cameras: rows {rows}, cols {cols}")
     print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras")
     print(f"  calibration  {'given' if array.calibration.given else 'nominal (the input stated none)'}")
-    for name, bits in info.bits.items():
+    for name, bits in asdict(info.bits).items():
         print(f"  {name:11}  {bits / 1000:.1f} kbit")
 
 
@@ -42,7 +43,7 @@ def document(info: StreamInfo) -> dict[str, Any]:
         "frames": info.frames,
         "fps": array.fps,
         "size": [array.width, array.height],
-        "bits": dict(info.bits),
+        "bits": asdict(info.bits),
         "disparity_range_px": list(info.header.disparity_range_px),
         "calibration": "given" if array.calibration.given else "nominal",
     }
@@ -50,9 +51,9 @@ def document(info: StreamInfo) -> dict[str, Any]:
 
 def summary(info: StreamInfo) -> str:
     """One line: frame sets, bits, rate."""
-    array, bits = info.header.array, info.bits["total"]
+    array, bits = info.header.array, info.bits.total
     rate = bits * array.fps / max(info.frames, 1)
     return (
         f"{info.frames} frame sets of {len(array.real)} cameras, {bits / 1000:.1f} kbit"
-        f" ({rate / 1000:.1f} kbit/s; maps {info.bits['disparity'] / bits:.0%})"
+        f" ({rate / 1000:.1f} kbit/s; maps {info.bits.disparity / bits:.0%})"
     )
