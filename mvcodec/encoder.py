@@ -1,0 +1,268 @@
+"""Frame sets in, packets out: matches, quantises the maps, codes every track; see FORMAT.md."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+import mvcodec
+from mvcodec.array import CameraArray
+from mvcodec.errors import InputError, SettingError, StreamClosed
+from mvcodec.frames import DisparityMap, FrameSet, Picture
+from mvcodec.stereo.matcher import Matcher
+from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind, view_name
+from mvcodec.video.codec import CodedPicture, Planes, RateControl, VideoEncoder, VideoSettings, check_qp
+from mvcodec.video.colour import even_size, grey_planes, to_planes
+from mvcodec.video.disparity_code import quantise
+from mvcodec.video.table import find_codec
+
+WORKERS = 2
+CODEC = "h264"
+
+DISPARITY_SHARE = 0.25
+"""Of the bits in bitrate mode; what the rule of `default_disparity_qp` comes to at middling rates."""
+
+
+def default_disparity_qp(qp: float) -> int:
+    """The maps' constant QP for a texture QP (or CRF): two below it, within 1..51."""
+    return min(max(round(qp) - 2, 1), 51)
+
+
+def default_gop(fps: float) -> int:
+    """The frame sets from keyframe to keyframe: as many as one second holds, at least one."""
+    return max(math.floor(fps + 1e-6), 1)
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderConfig:
+    """Settings of an encoder, checked here.
+
+    Attributes:
+        qp: constant quantiser of the pictures, 1..51; None where crf or bitrate_kbps governs.
+        crf: constant quality of the pictures, 1..51.
+        bitrate_kbps: average of all video tracks together, kbit/s.
+        disparity_qp: constant quantiser of the maps, 1..51; by default `default_disparity_qp`, or
+            a DISPARITY_SHARE of the bit rate. Given, bitrate_kbps is that of the pictures alone.
+        gop: frame sets from keyframe to keyframe, at most one second; by default one second.
+        matcher: name of a matcher, or one's own.
+        preset: effort of the video encoder.
+        disparity_range_px: (lo, hi) between neighbouring real cameras; by default estimated from
+            the first frame set.
+
+    Raises:
+        SettingError: a value is outside its range, or not exactly one of qp, crf and
+            bitrate_kbps is set.
+    """
+
+    qp: int | None = 27
+    crf: float | None = None
+    bitrate_kbps: float | None = None
+    disparity_qp: int | None = None
+    gop: int | None = None
+    matcher: str | Matcher = "sgbm"
+    preset: str = "medium"
+    disparity_range_px: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        RateControl(self.qp, self.crf, self.bitrate_kbps)
+        check_qp("disparity_qp", self.disparity_qp)
+        if self.gop is not None and self.gop < 1:
+            raise SettingError("gop", self.gop, "at least 1")
+        span = self.disparity_range_px
+        if span is not None and not (math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]):
+            raise SettingError("disparity_range_px", list(span), "lo < hi")
+
+    def rate_of(self, kind: TrackKind, cameras: int) -> RateControl:
+        """The rate control of one track of a kind, in an array of `cameras` real cameras."""
+        if kind is TrackKind.DISPARITY and self.disparity_qp is not None:
+            return RateControl(qp=self.disparity_qp)
+        if self.bitrate_kbps is not None:
+            maps = 0.0 if self.disparity_qp is not None else DISPARITY_SHARE
+            share = maps if kind is TrackKind.DISPARITY else 1 - maps
+            return RateControl(bitrate_kbps=max(self.bitrate_kbps * share / cameras, 1.0))
+        if kind is TrackKind.TEXTURE:
+            return RateControl(qp=self.qp, crf=self.crf)
+        quality = self.qp if self.qp is not None else self.crf
+        assert quality is not None
+        return RateControl(qp=default_disparity_qp(quality))
+
+
+class Encoder:
+    """Codes an array's real cameras. One frame set in, its packets out, at once.
+
+    Args:
+        array: the geometry; only its real cameras are coded.
+        config: settings; EncoderConfig() by default.
+
+    Raises:
+        SettingError: a setting does not fit the array, or names an unknown matcher or preset.
+    """
+
+    def __init__(self, array: CameraArray, config: EncoderConfig | None = None) -> None:
+        self.array = array
+        self.config = config or EncoderConfig()
+        longest = default_gop(array.fps)
+        self._gop = self.config.gop or longest
+        if self._gop > longest:
+            raise SettingError(
+                "gop", self._gop, f"1..{longest} (a keyframe each second at {array.fps:g} fps)"
+            )
+        self._matcher = _matcher(self.config.matcher)
+        self._encoders = self._make_encoders()
+        self._header: StreamHeader | None = None
+        self._count = 0
+        self._last: FrameSet | None = None
+        self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(WORKERS, "encode")
+
+    @property
+    def header(self) -> StreamHeader | None:
+        """The stream's header; None before the first frame set."""
+        return self._header
+
+    def push(self, frames: FrameSet) -> list[Packet]:
+        """Code one frame set.
+
+        Returns:
+            The header's packet where a GOP starts, then one packet for each track, pictures first.
+
+        Raises:
+            InputError: a real camera's picture is missing or of the wrong shape, or time goes back.
+            StreamClosed: after `flush`.
+        """
+        if self._pool is None:
+            raise StreamClosed("the encoder was flushed; it takes no more frame sets")
+        self._check(frames)
+        pictures = {camera: frames.pictures[camera] for camera in self.array.real}
+        if self._header is None:
+            self._header = self._make_header(frames)
+        header = self._header
+        keyframe = self._count % self._gop == 0
+        # The pictures are coded while the matcher runs.
+        jobs: dict[Track, Future[list[CodedPicture]]] = {}
+        for track in header.tracks:
+            if track.kind is TrackKind.TEXTURE and track.camera is not None:
+                jobs[track] = self._pool.submit(self._code_picture, track, pictures[track.camera], keyframe)
+        maps = self._matcher.match(self.array, pictures, header.disparity_range_px)
+        for track in header.tracks:
+            if track.kind is TrackKind.DISPARITY and track.camera is not None:
+                values = self._checked_map(maps, track)
+                jobs[track] = self._pool.submit(self._code_map, track, values, keyframe)
+        packets = [_packet(track, frames, job.result()) for track, job in jobs.items()]
+        self._count += 1
+        self._last = frames
+        if keyframe:
+            head = Packet(HEADER_TRACK, frames.index, frames.time_ns, True, header.to_json())
+            packets.insert(0, head)
+        return packets
+
+    def flush(self) -> list[Packet]:
+        """End the stream. Returns nothing, since no packet waits; `push` is an error from now on."""
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
+            for encoder in self._encoders.values():
+                encoder.flush()
+        return []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.flush()
+
+    def _make_encoders(self) -> dict[Track, VideoEncoder]:
+        array, codec = self.array, find_codec(CODEC)
+        width, height = even_size(array.width, array.height)
+        encoders = {}
+        for kind in (TrackKind.TEXTURE, TrackKind.DISPARITY):
+            rate = self.config.rate_of(kind, len(array.real))
+            settings = VideoSettings(kind, width, height, array.fps, self._gop, rate, self.config.preset)
+            encoders.update({Track(kind, camera): codec.encoder(settings) for camera in array.real})
+        return encoders
+
+    def _make_header(self, frames: FrameSet) -> StreamHeader:
+        span = self.config.disparity_range_px
+        if span is None:
+            from mvcodec.stereo.disparity_range import estimate_range  # noqa: PLC0415 - heavy, and not always needed
+
+            span = estimate_range(self.array, [frames], self.array.disparity_hint_px)
+        return StreamHeader(self.array, span, CODEC, frames.index, self._settings_record())
+
+    def _settings_record(self) -> dict[str, Any]:
+        config, codec = self.config, find_codec(CODEC)
+        maps = config.rate_of(TrackKind.DISPARITY, len(self.array.real))
+        matcher = config.matcher if isinstance(config.matcher, str) else type(config.matcher).__name__
+        record = {
+            "qp": config.qp,
+            "crf": config.crf,
+            "bitrate_kbps": config.bitrate_kbps,
+            "disparity_qp": maps.qp,
+            "gop": self._gop,
+            "preset": config.preset,
+            "matcher": matcher,
+            "video": codec.settings(TrackKind.TEXTURE),
+            "disparity": codec.settings(TrackKind.DISPARITY),
+            "encoder": f"mvcodec {mvcodec.__version__}",
+        }
+        return {name: value for name, value in record.items() if value is not None}
+
+    def _check(self, frames: FrameSet) -> None:
+        array = self.array
+        where = f"frame {frames.index}"
+        for camera in array.real:
+            name = f"{where}, view {view_name(camera)}"
+            picture = frames.pictures.get(camera)
+            if picture is None:
+                raise InputError(name, "no picture", "one of every real camera")
+            if picture.shape != (array.height, array.width, 3) or picture.dtype != np.uint8:
+                expected = f"uint8 RGB, {array.width}x{array.height}"
+                raise InputError(name, f"a picture of shape {picture.shape}, {picture.dtype}", expected)
+        if frames.index < 0 or frames.time_ns < 0:
+            raise InputError(where, f"time {frames.time_ns} ns", "index and time of 0 or more")
+        if self._last is not None and not (
+            frames.index > self._last.index and frames.time_ns > self._last.time_ns
+        ):
+            before = f"after frame {self._last.index} at {self._last.time_ns} ns"
+            raise InputError(where, f"time {frames.time_ns} ns {before}", "frame sets in order of time")
+
+    def _checked_map(self, maps: dict[tuple[int, int], DisparityMap], track: Track) -> DisparityMap:
+        assert track.camera is not None
+        name = f"{type(self._matcher).__name__}.match, view {view_name(track.camera)}"
+        found = maps.get(track.camera)
+        if found is None:
+            raise InputError(name, "no map", "one of every real camera")
+        shape = (self.array.height, self.array.width)
+        if found.values_px.shape != shape:
+            raise InputError(name, f"a map of shape {found.values_px.shape}", f"{shape}")
+        return found
+
+    def _code_picture(self, track: Track, picture: Picture, keyframe: bool) -> list[CodedPicture]:
+        return self._code(track, to_planes(picture), keyframe)
+
+    def _code_map(self, track: Track, disparity: DisparityMap, keyframe: bool) -> list[CodedPicture]:
+        assert self._header is not None
+        codes = quantise(disparity.values_px, self._header.disparity_range_px)
+        return self._code(track, grey_planes(codes), keyframe)
+
+    def _code(self, track: Track, planes: Planes, keyframe: bool) -> list[CodedPicture]:
+        return self._encoders[track].push(planes, keyframe)
+
+
+def _packet(track: Track, frames: FrameSet, coded: list[CodedPicture]) -> Packet:
+    (picture,) = coded
+    return Packet(track, frames.index, frames.time_ns, picture.keyframe, picture.data)
+
+
+def _matcher(matcher: str | Matcher) -> Matcher:
+    if not isinstance(matcher, str):
+        return matcher
+    from mvcodec.stereo.table import make_matcher  # noqa: PLC0415 - matchers are heavy to load
+
+    return make_matcher(matcher)

@@ -1,0 +1,159 @@
+"""The extension point of video coding: what a stock codec must do for one track."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvcodec.errors import SettingError
+from mvcodec.stream import TrackKind
+
+Plane = NDArray[np.uint8]
+
+PRESETS = (
+    "ultrafast",
+    "superfast",
+    "veryfast",
+    "faster",
+    "fast",
+    "medium",
+    "slow",
+    "slower",
+    "veryslow",
+    "placebo",
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Planes:
+    """A picture as the codec takes it: planar 4:2:0.
+
+    Attributes:
+        y: uint8 (H, W), H and W even.
+        u, v: uint8 (H/2, W/2).
+    """
+
+    y: Plane
+    u: Plane
+    v: Plane
+
+
+@dataclass(frozen=True, slots=True)
+class RateControl:
+    """How a track's bits are governed; exactly one of the three is set.
+
+    Attributes:
+        qp: constant quantiser, 1..51.
+        crf: constant quality, 1..51.
+        bitrate_kbps: average bit rate, kbit/s.
+
+    Raises:
+        SettingError: none or several are set, or one is outside its range.
+    """
+
+    qp: int | None = None
+    crf: float | None = None
+    bitrate_kbps: float | None = None
+
+    def __post_init__(self) -> None:
+        given = [name for name in ("qp", "crf", "bitrate_kbps") if getattr(self, name) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) or "none of them"
+            raise SettingError("qp, crf, bitrate_kbps", found, "exactly one of the three")
+        check_qp("qp", self.qp)
+        if self.crf is not None and not 1 <= self.crf <= 51:
+            raise SettingError("crf", self.crf, "1..51")
+        if self.bitrate_kbps is not None and not 1 <= self.bitrate_kbps <= 10_000_000:
+            raise SettingError("bitrate_kbps", self.bitrate_kbps, "1..10000000 kbit/s")
+
+
+def check_qp(setting: str, qp: int | None) -> None:
+    """Raise SettingError where a quantiser is given and is outside 1..51."""
+    if qp == 0:
+        raise SettingError(setting, 0, "1..51 (0 is lossless coding, a profile that players don't decode)")
+    if qp is not None and not (isinstance(qp, int) and 1 <= qp <= 51):
+        raise SettingError(setting, qp, "an integer, 1..51")
+
+
+@dataclass(frozen=True, slots=True)
+class VideoSettings:
+    """What the encoder of one track needs.
+
+    Attributes:
+        kind: what the track carries; codecs keep settings of their own for each kind.
+        width, height: of the pictures, px; both even.
+        fps: pictures a second.
+        gop: pictures from keyframe to keyframe, at most.
+        rate: bits or quality.
+        preset: effort, one of PRESETS.
+    """
+
+    kind: TrackKind
+    width: int
+    height: int
+    fps: float
+    gop: int
+    rate: RateControl
+    preset: str
+
+    def __post_init__(self) -> None:
+        if self.preset not in PRESETS:
+            raise SettingError("preset", self.preset, ", ".join(PRESETS))
+
+
+@dataclass(frozen=True, slots=True)
+class CodedPicture:
+    """One access unit as the container stores it; a keyframe stands on its own."""
+
+    data: bytes
+    keyframe: bool
+
+
+class VideoEncoder(Protocol):
+    """Codes one track. One picture in, its access unit out, at once."""
+
+    def push(self, planes: Planes, keyframe: bool = False) -> list[CodedPicture]:
+        """Code a picture; `keyframe` forces decoding to be able to start at it."""
+        ...
+
+    def flush(self) -> list[CodedPicture]:
+        """What is left inside (nothing, for a codec without delay); ends the encoder."""
+        ...
+
+
+class VideoDecoder(Protocol):
+    """Decodes one track. One access unit in, its picture out, at once."""
+
+    def push(self, data: bytes, label: str) -> list[Planes]:
+        """Decode an access unit; the planes belong to the caller.
+
+        Args:
+            label: what to call this access unit in an error (topic and time).
+
+        Raises:
+            StreamError: the data are damaged, or lack the keyframe they depend on.
+        """
+        ...
+
+    def flush(self) -> list[Planes]:
+        """What is left inside; ends the decoder."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Codec:
+    """A stock video codec.
+
+    Attributes:
+        encoder: makes the encoder of one track.
+        decoder: makes the decoder of one track.
+        settings: the codec's own settings for a kind of track, for the record in the header.
+    """
+
+    encoder: Callable[[VideoSettings], VideoEncoder]
+    decoder: Callable[[], VideoDecoder]
+    settings: Callable[[TrackKind], str]
