@@ -71,7 +71,8 @@ def test_holes_take_the_nearest_pixel_of_the_row_or_stay_black() -> None:
     left, right = random_pair(5)
     filled = Dils().synthesize_pair(left, right, 0.5, 1.0)
     black = Dils(DilsSettings(fill_holes=False)).synthesize_pair(left, right, 0.5, 1.0)
-    holes = ~filled.disparity.valid
+    holes = ~black.disparity.valid
+    assert filled.disparity.valid.all()
     assert 0 < holes.sum() < holes.size
     assert not filled.seen_by[holes].any()
     assert not black.pixels[holes].any()

@@ -112,3 +112,13 @@ def test_a_method_of_ones_own_runs_through_the_levels() -> None:
     assert recorder.asked == [(0.75, 1.0, (20, 30, 3)), (0.75, 1.0, (20, 30, 3)), (0.25, 0.5, (30, 20, 3))]
     np.testing.assert_array_equal(view.pixels, scene.decoded().pictures[0, 0])
     assert view.viewpoint == viewpoint
+
+
+@pytest.mark.parametrize("route", Route)
+def test_strips_that_no_pair_covers_are_filled_at_level_3(route: Route) -> None:
+    """Level 1's filled strip of columns is a strip of holes alone for an upper-lower pair."""
+    scene = PlaneScene(grid(3, 3, 60, 50, step=2), 10)
+    view = Dils(DilsSettings(route=route)).render(scene.decoded(), Viewpoint(1, 1))
+    # The textures have no black.
+    assert (view.pixels > 0).all()
+    assert (view.seen_by[-5:, -5:] == 0).all()

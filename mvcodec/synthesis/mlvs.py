@@ -35,7 +35,7 @@ class View:
 
     Attributes:
         pixels: uint8 (H, W, 3) RGB.
-        disparity: at this view; not valid where the pixel was filled.
+        disparity: at this view; of a synthesised one not valid where a hole was left.
         seen_by: uint8 (H, W), how many real cameras contributed; 0 = filled.
     """
 

@@ -31,8 +31,9 @@ def forward_pair(
         fill_holes: copy the nearest pixel of the row into holes; else they stay black.
 
     Returns:
-        The view; its disparity is not valid in holes, where it is filled along the row in any case (in a
-        row of holes alone it is the left view's).
+        The view. Its disparity is filled along the row in any case (in a row of holes alone it is the left
+        view's), and valid where there is a pixel, a filled one or not: the next level of MLVS works on
+        filled pictures as on others, else the strips that no pair covers would stay black.
     """
     from mvcodec.kernels import pairs  # noqa: PLC0415 - Numba takes half a second to import
 
@@ -47,6 +48,8 @@ def forward_pair(
         right_shift_px,
         left_weight,
     )
-    known = source >= 0
-    filled, disparity = pairs.filled_along_rows(pixels, disparity, pairs.nearest_known(known))
-    return View(filled if fill_holes else pixels, DisparityMap(disparity, known), seen_by)
+    nearest = pairs.nearest_known(source >= 0)
+    filled, disparity = pairs.filled_along_rows(pixels, disparity, nearest)
+    if fill_holes:
+        return View(filled, DisparityMap(disparity, nearest >= 0), seen_by)
+    return View(pixels, DisparityMap(disparity, source >= 0), seen_by)
