@@ -41,8 +41,8 @@ _MAX_GAP_BINS = 2
 # last of those in the main run.
 _NEAR_CLUSTER, _FAR_CLUSTER = 0.0007, 0.003
 _NEAR_TAIL, _FAR_TAIL = 0.0005, 0.001
-_NEAR_MARGIN, _FAR_MARGIN = 0.08, 0.03
-_LEAST_MARGIN_PX = 1.5
+_NEAR_MARGIN, _FAR_MARGIN = 0.08, 0.02
+_LEAST_MARGIN_PX = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,8 +97,8 @@ def estimate_range(
     if coarse is None or share < MIN_MATCHED_SHARE:
         fallback = hint_px or coarse or FALLBACK_RANGE_PX
         warnings.warn(
-            f"{array.name or 'input'}: too little texture to match ({share:.1%} of the pixels found a partner); "
-            f"disparity range set to {fallback[0]:g}..{fallback[1]:g} px",
+            f"{array.name or 'input'}: too little texture to match ({share:.1%} of the pixels found"
+            f" a partner); disparity range set to {fallback[0]:g}..{fallback[1]:g} px",
             MvCodecWarning,
             stacklevel=2,
         )

@@ -7,11 +7,13 @@ from collections.abc import Callable
 from mvcodec.errors import SettingError
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stereo.pairwise import Pairwise
+from mvcodec.stereo.sad import Sad
 from mvcodec.stereo.sgbm import Sgbm
 
 MATCHERS: dict[str, Callable[[], Matcher]] = {
     "sgbm": lambda: Pairwise(Sgbm()),
     "sgbm-h": lambda: Pairwise(Sgbm(), vertical=False),
+    "sad": lambda: Pairwise(Sad()),
 }
 
 
