@@ -52,7 +52,7 @@ def fill_rows(values: FloatMap, valid: Mask, fallback: float) -> FloatMap:
 
 @njit(cache=True, nogil=True)
 def fuse_maps(
-    values: NDArray[np.float32], valid: NDArray[np.bool_], tolerance: float
+    values: NDArray[np.float32], valid: NDArray[np.bool_], weights: NDArray[np.float32], tolerance: float
 ) -> tuple[FloatMap, Mask]:
     """Fuse (K, H, W) maps of one camera; see `mvcodec.stereo.fusion.fuse`."""
     count, height, width = values.shape
@@ -60,19 +60,19 @@ def fuse_maps(
     known = np.zeros((height, width), np.bool_)
     for y in range(height):
         for x in range(width):
-            best_size, best_mean, farthest = 0, np.inf, np.inf
+            best_weight, best_mean, farthest = 0.0, np.inf, np.inf
             for i in range(count):
                 farthest = min(farthest, values[i, y, x])
                 if not valid[i, y, x]:
                     continue
-                size, total = 0, 0.0
+                weight, total = 0.0, 0.0
                 for j in range(count):
                     if valid[j, y, x] and abs(values[j, y, x] - values[i, y, x]) <= tolerance:
-                        size += 1
-                        total += values[j, y, x]
-                mean = total / size
-                if size > best_size or (size == best_size and mean < best_mean):
-                    best_size, best_mean = size, mean
-            known[y, x] = best_size > 0
-            fused[y, x] = best_mean if best_size > 0 else farthest
+                        weight += weights[j, y, x]
+                        total += weights[j, y, x] * values[j, y, x]
+                mean = total / weight
+                if weight > best_weight or (weight == best_weight and mean < best_mean):
+                    best_weight, best_mean = weight, mean
+            known[y, x] = best_weight > 0
+            fused[y, x] = best_mean if best_weight > 0 else farthest
     return fused, known

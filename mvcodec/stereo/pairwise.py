@@ -11,7 +11,8 @@ import numpy as np
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.frames import DisparityMap, Picture
-from mvcodec.stereo.fusion import fuse
+from mvcodec.stereo.consistency import MEDIAN_SIZE, median
+from mvcodec.stereo.fusion import fuse, row_texture
 from mvcodec.stereo.matcher import PairMatcher
 
 THREADS = 2
@@ -67,14 +68,14 @@ class Pairwise:
         pairs = [
             pair for pair in camera_pairs(array) if self.vertical or not pair.vertical or array.cols == 1
         ]
-        candidates: dict[Position, list[DisparityMap]] = {position: [] for position in array.real}
         with ThreadPoolExecutor(THREADS) as pool:
             matched = pool.map(lambda pair: self._match(pair, array.cell_rho, pictures, range_px), pairs)
-            for pair, maps in zip(pairs, matched, strict=True):
-                candidates[pair.first].append(maps[0])
-                candidates[pair.second].append(maps[1])
-            fused = pool.map(lambda position: _fuse(candidates[position], array, range_px), candidates)
-            return dict(zip(candidates, fused, strict=True))
+            said: dict[Position, list[tuple[bool, DisparityMap]]] = {camera: [] for camera in array.real}
+            for pair, (first, second) in zip(pairs, matched, strict=True):
+                said[pair.first].append((pair.vertical, first))
+                said[pair.second].append((pair.vertical, second))
+            fused = pool.map(lambda camera: _fuse(pictures[camera], said[camera], range_px), said)
+            return dict(zip(said, fused, strict=True))
 
     def _match(
         self,
@@ -102,8 +103,17 @@ def _upright(disparity: DisparityMap, rho: float) -> DisparityMap:
     return DisparityMap(values, np.ascontiguousarray(disparity.valid.T))
 
 
-def _fuse(candidates: list[DisparityMap], array: CameraArray, range_px: tuple[float, float]) -> DisparityMap:
-    if candidates:
-        return fuse(candidates)
-    shape = array.height, array.width
-    return DisparityMap(np.full(shape, range_px[0], np.float32), np.zeros(shape, np.bool_))
+def _fuse(
+    picture: Picture, said: list[tuple[bool, DisparityMap]], range_px: tuple[float, float]
+) -> DisparityMap:
+    """One map from what partners said, each with whether it stands above or below."""
+    if not said:
+        shape = picture.shape[:2]
+        return DisparityMap(np.full(shape, range_px[0], np.float32), np.zeros(shape, np.bool_))
+    candidates = [disparity for _, disparity in said]
+    if len(candidates) == 1:
+        return candidates[0]
+    texture = {False: row_texture(picture), True: row_texture(transposed(picture)).T}
+    fused = fuse(candidates, [texture[vertical] for vertical, _ in said])
+    # Switching between partners from pixel to pixel leaves specks.
+    return DisparityMap(median(fused.values_px, MEDIAN_SIZE, range_px), fused.valid)
