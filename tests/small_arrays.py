@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ FAR_PX, NEAR_PX = 1, 3
 """Disparity per grid step."""
 
 
+@cache
 def photograph(name: str) -> Picture:
     """A photograph that scikit-image ships."""
     return np.asarray(getattr(data, name)(), np.uint8)
@@ -28,7 +30,7 @@ def picture(view: Position, frame: int, width: int = WIDTH, height: int = HEIGHT
     top, left = 100 + FAR_PX * row, 150 + FAR_PX * col
     seen = background[top : top + height, left : left + width].copy()
     patch = photograph("chelsea")[100:124, 150:180]
-    top, left = 24 - NEAR_PX * row, 40 - NEAR_PX * col + 2 * frame
+    top, left = 24 - NEAR_PX * row, 40 - NEAR_PX * col + 2 * (frame % 10)
     seen[top : top + 24, left : left + 30] = patch
     return seen
 

@@ -63,12 +63,12 @@ def run(arguments: argparse.Namespace) -> None:
     form = arguments.format or ("png" if arguments.view else "array")
     if form == "array" and arguments.view:
         raise SettingError("--view", "with --format array", "--grid RxC, since an array folder holds a grid")
-    check_output(form, arguments.output)
     source: Path | BinaryIO = sys.stdin.buffer
     if arguments.input != STANDARD_INPUT:
         source = Path(arguments.input)
         if source.resolve() == arguments.output.resolve():
             raise SettingError("OUT", arguments.output, "another file than IN.mcap")
+    check_output(form, arguments.output)
     with Decoder.open(source, arguments.frames) as decoder:
         views = _view_grid(decoder.header, arguments)
         with (
@@ -97,7 +97,7 @@ def _view_grid(header: StreamHeader, arguments: argparse.Namespace) -> ViewGrid:
     viewpoints = tuple(Viewpoint(*place) for place in arguments.view)
     for viewpoint in viewpoints:
         array.check_viewpoint(viewpoint)
-    return ViewGrid(array, 1, len(viewpoints), viewpoints)
+    return ViewGrid(array, 1, len(viewpoints), viewpoints, named_by_place=False)
 
 
 def _frame_total(source: Path | BinaryIO, frames: slice | None) -> int | None:

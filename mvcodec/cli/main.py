@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import warnings
 from collections.abc import Sequence
@@ -46,6 +47,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: from argparse, for --help (0) and arguments that don't parse (2).
     """
+    # OpenCV writes lines of its own to standard error about files that we report; it reads this when loaded.
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
     arguments = sys.argv[1:] if argv is None else list(argv)
     parsed = _parser(arguments).parse_args(join_negative_values(arguments))
     with warnings.catch_warnings():

@@ -17,6 +17,7 @@ from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.output.mosaic import mosaic
 from mvcodec.output.pictures import viewpoint_name, write_png
 from mvcodec.output.video_file import Mp4Writer
+from mvcodec.stream import view_name
 
 THREADS = 2
 
@@ -29,12 +30,21 @@ class ViewGrid:
         array: of the stream.
         rows, cols: how the views lie in a mosaic, or in the array folder.
         viewpoints: rows * cols of them, row order.
+        named_by_place: files are named after the place in this grid, else after the viewpoint.
     """
 
     array: CameraArray
     rows: int
     cols: int
     viewpoints: tuple[Viewpoint, ...]
+    named_by_place: bool = True
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The name of each view in files and folders."""
+        if self.named_by_place:
+            return tuple(view_name(divmod(number, self.cols)) for number in range(len(self.viewpoints)))
+        return tuple(viewpoint_name(viewpoint) for viewpoint in self.viewpoints)
 
     @property
     def real(self) -> tuple[Position, ...]:
@@ -113,7 +123,7 @@ class PngOutput(_Output):
     def push(self, pictures: Sequence[Picture], index: int) -> None:  # noqa: ARG002 - as ViewOutput has it
         """See ViewOutput."""
         name = f"{self._count:06d}.png"
-        paths = [self._path / viewpoint_name(viewpoint) / name for viewpoint in self._views.viewpoints]
+        paths = [self._path / view / name for view in self._views.names]
         list(self._pool.map(write_png, paths, pictures))
         self._count += 1
 
@@ -130,8 +140,8 @@ class Mp4Output(_Output):
         """See ViewOutput."""
         array = self._views.array
         if not self._writers:
-            for viewpoint in self._views.viewpoints:
-                path = self._path / f"{viewpoint_name(viewpoint)}.mp4"
+            for view in self._views.names:
+                path = self._path / f"{view}.mp4"
                 writer = Mp4Writer(path, array.width, array.height, array.fps)
                 self._writers.append(self._resources.enter_context(writer))
         list(self._pool.map(Mp4Writer.push, self._writers, pictures))

@@ -1,0 +1,132 @@
+"""What the command line understands and what it refuses, before any work begins."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+
+from mvcodec.cli.arguments import (
+    disparity_range,
+    frame_slice,
+    join_negative_values,
+    pair_of_sizes,
+    positive_int,
+    view,
+)
+from mvcodec.cli.main import COMMANDS, main
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("0:9", slice(0, 9)),
+        (":9", slice(None, 9)),
+        ("3:", slice(3, None)),
+        ("-2:", slice(-2, None)),
+        (":", slice(None, None)),
+        ("1:-1", slice(1, -1)),
+    ],
+)
+def test_frames_are_python_slices(text: str, expected: slice) -> None:
+    assert frame_slice(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("-25,20", (-25.0, 20.0)), ("0.5,1e2", (0.5, 100.0)), ("auto", "auto"), ("-3,-1.5", (-3.0, -1.5))],
+)
+def test_disparity_ranges_may_be_negative(text: str, expected: object) -> None:
+    assert disparity_range(text) == expected
+
+
+def test_sizes_and_views_parse() -> None:
+    assert pair_of_sizes("640x360") == (640, 360)
+    assert pair_of_sizes("5X3") == (5, 3)
+    assert view("0.5,1.25") == (0.5, 1.25)
+    assert positive_int("24") == 24
+
+
+@pytest.mark.parametrize(
+    ("parser", "text"),
+    [
+        (frame_slice, "5"),
+        (frame_slice, "0:8:2"),
+        (frame_slice, "a:b"),
+        (disparity_range, "5,5"),
+        (disparity_range, "9,2"),
+        (disparity_range, "nan,2"),
+        (disparity_range, "1"),
+        (disparity_range, "1,2,3"),
+        (pair_of_sizes, "5"),
+        (pair_of_sizes, "0x5"),
+        (pair_of_sizes, "5x-1"),
+        (pair_of_sizes, "5x5x5"),
+        (view, "1"),
+        (view, "inf,0"),
+        (view, "a,b"),
+        (positive_int, "0"),
+        (positive_int, "-3"),
+        (positive_int, "2.5"),
+    ],
+)
+def test_what_does_not_parse_is_named_with_what_was_expected(
+    parser: Callable[[str], object], text: str
+) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match=r"found '.*', expected"):
+        parser(text)
+
+
+def test_values_with_a_minus_sign_are_kept_with_their_option() -> None:
+    given = ["encode", "in", "--disparity-range", "-25,20", "--frames", "-2:", "out.mcap", "--quiet"]
+    joined = ["encode", "in", "--disparity-range=-25,20", "--frames=-2:", "out.mcap", "--quiet"]
+    assert join_negative_values(given) == joined
+    assert join_negative_values(["--frames", "--quiet"]) == ["--frames", "--quiet"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main([command, "--help"])
+    assert left.value.code == 0
+    assert f"usage: mvcodec {command}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ([], "required: COMMAND"),
+        (["transmogrify"], "invalid choice: 'transmogrify'"),
+        (["encode", "in"], "required: OUT.mcap"),
+        (["encode", "in", "o.mcap", "--qp", "30", "--crf", "20"], "not allowed with"),
+        (["encode", "in", "o.mcap", "--qp", "many"], "--qp: invalid int value"),
+        (["encode", "in", "o.mcap", "--disparity-range", "20,-25"], "--disparity-range: found '20,-25'"),
+        (["decode", "in", "out", "--format", "gif"], "invalid choice: 'gif'"),
+        (["decode", "in", "out", "--grid", "3x3", "--view", "0,0"], "not allowed with"),
+        (["compare", "a", "b", "--frames", "3"], "--frames: found '3'"),
+        (["sample", "out", "--size", "big"], "--size: found 'big'"),
+    ],
+)
+def test_arguments_that_do_not_fit_leave_with_2_and_one_line(
+    arguments: list[str], complaint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+    message = capsys.readouterr().err
+    assert complaint in message
+    assert message.count("\n") == 1
+
+
+def test_help_does_not_load_what_only_the_commands_need() -> None:
+    heavy = ["numpy", "cv2", "numba", "av", "mcap", "skimage", "tqdm"]
+    code = (
+        "import sys\nfrom mvcodec.cli.main import main\n"
+        "try: main(['--help'])\nexcept SystemExit: pass\n"
+        f"print(*sorted(set(sys.modules) & set({heavy})), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == ""
