@@ -65,7 +65,7 @@ class EncoderConfig:
     disparity_qp: int | None = None
     gop: int | None = None
     matcher: str | Matcher = "sgbm"
-    preset: str = "medium"
+    preset: str = "slow"
     disparity_range_px: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:

@@ -27,38 +27,20 @@ OPTICAL_TO_RIG = (-0.5, 0.5, -0.5, 0.5)
 
 HEADER_SCHEMA_NAME = "mvcodec.Header"
 
-_NUMBER: dict[str, Any] = {"type": "number"}
-_INTEGER: dict[str, Any] = {"type": "integer"}
-_INTEGERS: dict[str, Any] = {"type": "array", "items": _INTEGER}
-_PAIR: dict[str, Any] = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
-
-
-def _object(**properties: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "object", "properties": properties}
-
-
+# Short, since a file holds it twice; FORMAT.md has the whole.
 HEADER_SCHEMA = json.dumps(
-    _object(
-        format={"const": "mvcodec"},
-        version=_INTEGER,
-        codec={"type": "string"},
-        array=_object(
-            rows=_INTEGER,
-            cols=_INTEGER,
-            width=_INTEGER,
-            height=_INTEGER,
-            fps=_NUMBER,
-            real_rows=_INTEGERS,
-            real_cols=_INTEGERS,
-            calibration={"type": "object"},
-            rho=_NUMBER,
-            disparity_per_step_px={"type": ["array", "null"]},
-            name={"type": "string"},
-        ),
-        disparity_range_px=_PAIR,
-        first_frame=_INTEGER,
-        settings={"type": "object"},
-    ),
+    {
+        "type": "object",
+        "properties": {
+            "format": {"const": "mvcodec"},
+            "version": {"type": "integer"},
+            "codec": {"type": "string"},
+            "array": {"type": "object"},
+            "disparity_range_px": {"type": "array"},
+            "first_frame": {"type": "integer"},
+            "settings": {"type": "object"},
+        },
+    },
     separators=(",", ":"),
 ).encode()
 

@@ -16,6 +16,7 @@ from av.video.reformatter import ColorPrimaries, ColorRange, Colorspace, ColorTr
 
 from mvcodec.errors import StreamError
 from mvcodec.stream import TrackKind
+from mvcodec.video.annexb import without_user_data
 from mvcodec.video.codec import CodedPicture, Plane, Planes, VideoSettings
 
 # No packet may wait for a later picture: no B-frames, no look-ahead, and no variable frame rate
@@ -71,13 +72,21 @@ class H264Encoder:
         frame.time_base = self._time_base
         frame.pict_type = PictureType.I if keyframe else PictureType.NONE
         self._count += 1
-        return [CodedPicture(bytes(packet), packet.is_keyframe) for packet in self._context.encode(frame)]
+        return self._coded(frame)
 
     def flush(self) -> list[CodedPicture]:
         """See `VideoEncoder`."""
-        if not self._count:
-            return []
-        return [CodedPicture(bytes(packet), packet.is_keyframe) for packet in self._context.encode(None)]
+        return self._coded(None) if self._count else []
+
+    def _coded(self, frame: VideoFrame | None) -> list[CodedPicture]:
+        # x264 puts its options, 600 bytes of text, into each track's first picture: 1 % of a short
+        # file with eight tracks. The header's settings say the same once.
+        return [
+            CodedPicture(
+                without_user_data(bytes(packet)) if packet.is_keyframe else bytes(packet), packet.is_keyframe
+            )
+            for packet in self._context.encode(frame)
+        ]
 
 
 class H264Decoder:
