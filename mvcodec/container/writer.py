@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, BinaryIO, Self
@@ -71,11 +72,14 @@ class McapWriter:
             if self._mcap is not None:
                 self._mcap.finish()  # type: ignore[no-untyped-call]
             if self._file is not None:
-                self._file.flush()
-                # Closes what was opened here; a file that was handed in stays open (see _Pipe).
-                self._file.close()
+                self._file.close()  # a file that was handed in stays open: see _Pipe
         except OSError as error:
             raise OutputError(self._name, error.strerror or error) from None
+        finally:
+            if self._file is not None:
+                # After a failure the buffer would be written again, and fail again, at exit.
+                with suppress(OSError):
+                    self._file.raw.close()
 
     def __enter__(self) -> Self:
         return self

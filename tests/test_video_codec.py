@@ -1,0 +1,180 @@
+"""What every codec of the table must do, and what H.264 streams must look like to be played."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import av
+import numpy as np
+import pytest
+from av.video.codeccontext import VideoCodecContext
+from small_arrays import photograph
+
+from mvcodec.errors import SettingError, StreamError
+from mvcodec.stream import TrackKind
+from mvcodec.video import annexb
+from mvcodec.video.codec import PRESETS, Codec, CodedPicture, RateControl, VideoSettings
+from mvcodec.video.colour import grey_planes, to_picture, to_planes
+from mvcodec.video.disparity_code import dequantise, quantise
+from mvcodec.video.table import CODECS, find_codec
+
+WIDTH, HEIGHT = 128, 96
+
+
+def _settings(kind: TrackKind = TrackKind.TEXTURE, preset: str = "medium", **rate: float) -> VideoSettings:
+    control = RateControl(**(rate or {"qp": 24}))  # type: ignore[arg-type]
+    return VideoSettings(kind, WIDTH, HEIGHT, 10.0, 5, control, preset)
+
+
+def _picture(number: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    left = 50 + 3 * number
+    return photograph("coffee")[80 : 80 + HEIGHT, left : left + WIDTH]
+
+
+def _coded(codec: Codec, settings: VideoSettings, count: int = 12) -> list[CodedPicture]:
+    encoder = codec.encoder(settings)
+    coded = []
+    for number in range(count):
+        out = encoder.push(to_planes(_picture(number)), keyframe=number % 5 == 0)
+        assert len(out) == 1, "a picture waits for a later one"
+        coded += out
+    assert encoder.flush() == []
+    return coded
+
+
+@pytest.fixture(params=list(CODECS))
+def codec(request: pytest.FixtureRequest) -> Codec:
+    return CODECS[request.param]
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_one_picture_in_one_access_unit_out_and_back(codec: Codec, preset: str) -> None:
+    decoder = codec.decoder()
+    for number, picture in enumerate(_coded(codec, _settings(preset=preset), 7)):
+        (planes,) = decoder.push(picture.data, "test")
+        error = to_picture(planes, WIDTH, HEIGHT).astype(float) - _picture(number)
+        assert math.sqrt(np.mean(error**2)) < 8, "not the picture that went in"
+    assert decoder.flush() == []
+
+
+def test_keyframes_come_when_asked_and_decoding_can_start_at_each(codec: Codec) -> None:
+    coded = _coded(codec, _settings())
+    assert [number for number, picture in enumerate(coded) if picture.keyframe] == [0, 5, 10]
+    from_start, from_key = codec.decoder(), codec.decoder()
+    for number, picture in enumerate(coded):
+        (expected,) = from_start.push(picture.data, "test")
+        if number >= 5:
+            (found,) = from_key.push(picture.data, "test")
+            np.testing.assert_array_equal(found.y, expected.y)
+
+
+def test_damage_is_an_error_that_names_the_packet(codec: Codec) -> None:
+    coded = _coded(codec, _settings(), 3)
+    for broken in (coded[1].data[: len(coded[1].data) // 2], b"no video at all" * 9):
+        decoder = codec.decoder()
+        decoder.push(coded[0].data, "key")
+        with pytest.raises(StreamError, match=r"^/camera/r00_c00/video at 0\.1 s: found a damaged picture"):
+            decoder.push(broken, "/camera/r00_c00/video at 0.1 s")
+    with pytest.raises(StreamError):
+        codec.decoder().push(coded[1].data, "without its keyframe")
+
+
+def test_fewer_bits_at_higher_qp_and_crf(codec: Codec) -> None:
+    sizes = [sum(len(c.data) for c in _coded(codec, _settings(qp=qp))) for qp in (1, 20, 40, 51)]
+    assert all(a > b for a, b in pairwise(sizes))
+    sizes = [sum(len(c.data) for c in _coded(codec, _settings(crf=crf))) for crf in (15.0, 22.5, 30.0)]
+    assert all(a > b for a, b in pairwise(sizes))
+
+
+def test_bitrate_is_met(codec: Codec) -> None:
+    coded = _coded(codec, _settings(bitrate_kbps=200.0), 40)
+    kbps = sum(len(picture.data) for picture in coded) * 8 / (40 / 10.0) / 1000
+    assert 140 < kbps < 260
+
+
+def test_h264_keyframes_are_idr_with_their_parameter_sets_and_one_slice() -> None:
+    for picture in _coded(CODECS["h264"], _settings()):
+        types = [annexb.nal_type(unit) for unit in annexb.nal_units(picture.data)]
+        assert picture.data.startswith(b"\x00\x00\x00\x01") or picture.data.startswith(b"\x00\x00\x01")
+        if picture.keyframe:
+            assert types == [annexb.SPS, annexb.PPS, annexb.IDR_SLICE]
+        else:
+            assert types == [annexb.SLICE]
+
+
+@pytest.mark.parametrize("qp", [1, 27, 51])
+def test_h264_profile_is_one_that_players_know(qp: int) -> None:
+    (sps,) = [
+        u for u in annexb.nal_units(_coded(CODECS["h264"], _settings(qp=qp), 1)[0].data) if u[0] & 31 == 7
+    ]
+    assert sps[1] in (66, 77, 100), "not Baseline, Main or High"
+
+
+@pytest.mark.parametrize(("kind", "colour_range"), [(TrackKind.TEXTURE, 1), (TrackKind.DISPARITY, 2)])
+def test_h264_tags_matrix_and_range(kind: TrackKind, colour_range: int) -> None:
+    context = VideoCodecContext.create("h264", "r")
+    context.thread_type = "SLICE"
+    (frame,) = context.decode(av.Packet(_coded(CODECS["h264"], _settings(kind), 1)[0].data))
+    assert (frame.colorspace, frame.color_range) == (1, colour_range)
+    assert (context.color_primaries, context.color_trc) == (1, 1)
+    assert not context.has_b_frames
+
+
+def test_maps_keep_their_codes_within_the_quantiser(codec: Codec) -> None:
+    codes = np.tile(np.arange(0, 256, 2, dtype=np.uint8), (HEIGHT, 1))
+    encoder, decoder = codec.encoder(_settings(TrackKind.DISPARITY, qp=10)), codec.decoder()
+    (coded,) = encoder.push(grey_planes(codes), True)
+    (planes,) = decoder.push(coded.data, "test")
+    assert np.abs(planes.y.astype(int) - codes).max() <= 3, "maps must not pass through a range conversion"
+    assert np.all(planes.u == 128)
+    assert np.all(planes.v == 128)
+
+
+@pytest.mark.parametrize(
+    ("rate", "message"),
+    [
+        ({"qp": 0}, r"qp: found 0, expected 1\.\.51 \(0 is lossless"),
+        ({"qp": 52}, r"qp: found 52, expected an integer, 1\.\.51"),
+        ({"crf": 0.0}, r"crf: found 0\.0, expected 1\.\.51"),
+        ({"bitrate_kbps": -5.0}, r"bitrate_kbps: found -5\.0"),
+        ({}, r"found none of them, expected exactly one"),
+        ({"qp": 20, "crf": 20.0}, r"found qp and crf, expected exactly one"),
+    ],
+)
+def test_bad_rates_are_refused(rate: dict[str, float], message: str) -> None:
+    with pytest.raises(SettingError, match=message):
+        RateControl(**rate)  # type: ignore[arg-type]
+
+
+def test_unknown_names_are_refused_with_the_choices() -> None:
+    with pytest.raises(SettingError, match=r"preset: found turbo, expected ultrafast, .*placebo"):
+        _settings(preset="turbo")
+    with pytest.raises(SettingError, match=r"codec: found vp9, expected h264"):
+        find_codec("vp9")
+
+
+def test_user_data_is_taken_out_and_the_rest_left_alone() -> None:
+    start, sps, idr = b"\x00\x00\x00\x01", b"\x67\x64\x01", b"\x65\x88\x00\x00\x03\x01\x80"
+    about, timing = b"\x06\x05\x03abc\x80", b"\x06\x01\x01\x10\x80"
+    assert (
+        annexb.without_user_data(start + sps + start + about + start[1:] + idr) == start + sps + start + idr
+    )
+    untouched = start[1:] + timing + start + idr
+    assert annexb.without_user_data(untouched) == untouched
+
+
+def test_disparity_codes_are_linear_with_255_nearest() -> None:
+    values = np.array([[-4.0, 12.0, 4.0, -100.0, 100.0]], np.float32)
+    codes = quantise(values, (-4.0, 12.0))
+    np.testing.assert_array_equal(codes, [[0, 255, 128, 0, 255]])
+    back = dequantise(codes, (-4.0, 12.0))
+    np.testing.assert_allclose(back.values_px[0, :3], values[0, :3], atol=16 / 255 / 2 + 1e-6)
+    assert back.values_px.dtype == np.float32
+    assert back.valid.all()
+
+
+def test_every_code_survives_the_way_there_and_back() -> None:
+    codes = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    for range_px in ((-25.3, 20.1), (0.0, 0.5), (7.0, 1023.0)):
+        np.testing.assert_array_equal(quantise(dequantise(codes, range_px).values_px, range_px), codes)
