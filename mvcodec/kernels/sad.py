@@ -90,6 +90,7 @@ def _winner(costs: NDArray[np.int32], x: int, slant: int, low: int, subpixel: bo
     if subpixel and 0 < best < levels - 1 and 0 <= before < width and 0 <= after < width:
         first, last = costs[best - 1, before], costs[best + 1, after]
         bend = first + last - 2 * cheapest
-        if bend > 0:
+        # A cheaper neighbour is one that was no candidate, since it looks outside the other picture.
+        if min(first, last) >= cheapest and bend > 0:
             return float(low + best + 0.5 * (first - last) / bend)
     return float(low + best)

@@ -36,7 +36,7 @@ class SgbmSettings:
         median_size: final median, 0 (none), 3 or 5.
     """
 
-    block_size: int = 3
+    block_size: int = 1
     p1: int = 8
     p2: int = 32
     prefilter_cap: int = 15
