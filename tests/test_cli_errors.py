@@ -145,7 +145,7 @@ def test_an_mcap_without_our_header(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     with path.open("wb") as file:
         writer = Writer(file)
-        writer.start()  # type: ignore[no-untyped-call]
+        writer.start()
         channel = writer.register_channel("/else", "json", 0)
         writer.add_message(channel, 0, b"{}", 0)
         writer.finish()  # type: ignore[no-untyped-call]

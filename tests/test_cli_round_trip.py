@@ -174,10 +174,11 @@ def test_a_pair_of_cameras_that_are_both_real(tmp_path: Path) -> None:
 
 
 def test_launchers_are_the_same_commands(array: Path, tmp_path: Path) -> None:
-    for tool, arguments in (
-        ("encode.py", [array, tmp_path / "x.mcap", "--frames", ":1", "--quiet"]),
-        ("decode.py", [tmp_path / "x.mcap", tmp_path / "out", "--view", "1,1"]),
-    ):
+    calls: dict[str, list[str | Path]] = {
+        "encode.py": [array, tmp_path / "x.mcap", "--frames", ":1", "--quiet"],
+        "decode.py": [tmp_path / "x.mcap", tmp_path / "out", "--view", "1,1"],
+    }
+    for tool, arguments in calls.items():
         subprocess.run([sys.executable, TOOLS / tool, *arguments], check=True)
     assert (tmp_path / "out" / "r01_c01" / "000000.png").is_file()
 

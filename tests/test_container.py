@@ -276,7 +276,7 @@ def test_a_full_disk_is_one_line(coded: list[list[Packet]]) -> None:
         Path("/dev/full").open("wb", buffering=0) as pipe,
         pytest.raises(OutputError, match="No space left on device"),
     ):
-        _fill_up(pipe, coded)  # type: ignore[arg-type]
+        _fill_up(pipe, coded)
 
 
 def _fill_up(target: BinaryIO | Path, coded: list[list[Packet]]) -> None:

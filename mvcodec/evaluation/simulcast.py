@@ -29,7 +29,7 @@ class Simulcast:
     Attributes:
         bits: of all elementary streams; no container, in the anchor's favour.
         frames: frame sets coded.
-        quality: every view counts as real, since every view is coded.
+        quality: with the compared array's real and virtual views apart, though all are coded here.
     """
 
     bits: int
@@ -61,7 +61,7 @@ def simulcast(
     """
     chosen = resolve_frames(frames, source.frame_count, source.name)
     settings = _settings(source.array, rate, gop, preset)
-    meter = QualityMeter(source.array.positions)
+    meter = QualityMeter(source.array.real)
 
     def measure(view: Position, original: Picture, decoded: Picture) -> None:
         meter.push(view, original, decoded)
