@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Self
@@ -87,6 +88,8 @@ class Decoder:
             for decoded in self.push(packet):
                 if number >= start:
                     yield decoded
+        if self._pending and self._reader.frame_count is not None:  # else the end was cut off
+            raise self._incomplete(next(iter(self._pending.values())))
         if number < start:
             raise SettingError(
                 "frames", f"{start}:", f"less than the {number + 1} frame sets of {self._name}"
@@ -150,14 +153,16 @@ class Decoder:
         label = self._label(packet)
         if packet.track not in self._decoders:
             raise StreamError(label, "a track that the header does not name", "a real camera's")
+        waiting = next(iter(self._pending.values()), None)
+        if waiting is not None and waiting.index != packet.index:
+            raise self._incomplete(waiting)
         if packet.track in self._pending:
             raise StreamError(label, "two packets of one frame set", "one")
-        for other in self._pending.values():
-            if other.index != packet.index:
-                missing = next(track for track in self._decoders if track not in self._pending)
-                at = f"{self._name}: {missing.topic} at {other.time_ns / 1e9:.3f} s"
-                raise StreamError(at, "no packet", "one for each track of a frame set")
-            break
+
+    def _incomplete(self, waiting: Packet) -> StreamError:
+        missing = next(track for track in self._decoders if track not in self._pending)
+        label = self._label(replace(waiting, track=missing))
+        return StreamError(label, "no packet", "one for each track of a frame set")
 
     def _label(self, packet: Packet) -> str:
         return f"{self._name}: {packet.track.topic} at {packet.time_ns / 1e9:.3f} s"

@@ -16,7 +16,15 @@ from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind, view_name
-from mvcodec.video.codec import CodedPicture, Planes, RateControl, VideoEncoder, VideoSettings, check_qp
+from mvcodec.video.codec import (
+    CodedPicture,
+    Planes,
+    RateControl,
+    VideoEncoder,
+    VideoSettings,
+    check_preset,
+    check_qp,
+)
 from mvcodec.video.colour import even_size, grey_planes, to_planes
 from mvcodec.video.disparity_code import quantise
 from mvcodec.video.table import find_codec
@@ -71,6 +79,7 @@ class EncoderConfig:
     def __post_init__(self) -> None:
         RateControl(self.qp, self.crf, self.bitrate_kbps)
         check_qp("disparity_qp", self.disparity_qp)
+        check_preset(self.preset)
         if self.gop is not None and self.gop < 1:
             raise SettingError("gop", self.gop, "at least 1")
         span = self.disparity_range_px
@@ -241,6 +250,8 @@ class Encoder:
         shape = (self.array.height, self.array.width)
         if found.values_px.shape != shape:
             raise InputError(name, f"a map of shape {found.values_px.shape}", f"{shape}")
+        if not np.isfinite(found.values_px).all():
+            raise InputError(name, "values that are not finite", "a finite disparity at every pixel")
         return found
 
     def _code_picture(self, track: Track, picture: Picture, keyframe: bool) -> list[CodedPicture]:

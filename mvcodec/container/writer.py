@@ -151,8 +151,7 @@ class _Pipe(io.RawIOBase):
         return True
 
     def write(self, data: ReadableBuffer, /) -> int:
-        count = memoryview(data).nbytes
-        self._output.write(data)
+        count = self._output.write(data)  # may be a part: io.BufferedWriter writes the rest
         self._written += count
         return count
 

@@ -79,6 +79,12 @@ def check_qp(setting: str, qp: int | None) -> None:
         raise SettingError(setting, qp, "an integer, 1..51")
 
 
+def check_preset(preset: str) -> None:
+    """Raise SettingError where an effort is none of PRESETS."""
+    if preset not in PRESETS:
+        raise SettingError("preset", preset, ", ".join(PRESETS))
+
+
 @dataclass(frozen=True, slots=True)
 class VideoSettings:
     """What the encoder of one track needs.
@@ -101,8 +107,7 @@ class VideoSettings:
     preset: str
 
     def __post_init__(self) -> None:
-        if self.preset not in PRESETS:
-            raise SettingError("preset", self.preset, ", ".join(PRESETS))
+        check_preset(self.preset)
 
 
 @dataclass(frozen=True, slots=True)
