@@ -1,0 +1,140 @@
+"""Write the conformance pairs: tests/conformance/NAME.mcap, and NAME.json with what any decoder must find.
+
+Run it only when the format changes: later versions must read the files of earlier ones.
+
+    python tools/make_conformance.py tests/conformance
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import sys
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from skimage import data
+
+from mvcodec.array import Calibration, CameraArray, Position
+from mvcodec.container import McapReader, McapWriter
+from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.frames import DisparityMap, FrameSet, Picture
+from mvcodec.stream import TrackKind
+from mvcodec.video.table import find_codec
+
+RANGE_PX = (-3.0, 9.5)
+
+
+class Known:
+    """A matcher that returns a made-up map, so that the files don't depend on any matching."""
+
+    def match(
+        self, array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
+    ) -> dict[Position, DisparityMap]:
+        """A slope with a step, lower in each camera."""
+        low, high = range_px
+        y, x = np.mgrid[: array.height, : array.width]
+        slope = x / array.width * 0.6 + 0.4 * (y > array.height / 2)
+        valid = np.ones(slope.shape, np.bool_)
+        return {
+            (row, col): DisparityMap((low + slope * (high - low) / (1 + row + col)).astype(np.float32), valid)
+            for row, col in pictures
+        }
+
+
+def _nominal(rows: int, cols: int, width: int, height: int, fps: float) -> CameraArray:
+    nominal = Calibration.nominal(width, height)
+    ends = [tuple(dict.fromkeys((0, count - 1))) for count in (rows, cols)]
+    return CameraArray(rows, cols, width, height, fps, ends[0], ends[1], nominal)
+
+
+def _calibrated() -> CameraArray:
+    return CameraArray(
+        rows=3,
+        cols=5,
+        width=48,
+        height=32,
+        fps=29.97,
+        real_rows=(0, 2),
+        real_cols=(0, 2, 4),
+        calibration=Calibration(50.0, 52.0, 24.5, 15.0, 0.03, d_inf_px_per_step=0.25),
+        rho=1.5,
+        disparity_per_step_px=(-1.5, 4.75),
+        name="three by five",
+    )
+
+
+CASES: dict[str, tuple[CameraArray, int, int, dict[str, Any]]] = {
+    # name: (array, frame sets, first frame, settings)
+    "square": (_nominal(3, 3, 64, 48, 10.0), 6, 0, {"qp": 30, "gop": 3}),
+    "odd_size": (_nominal(1, 4, 33, 17, 25.0), 3, 0, {"qp": 24}),
+    "one_column": (_nominal(4, 1, 32, 32, 2.0), 4, 7, {"qp": 30, "disparity_qp": 40}),
+    "calibrated": (_calibrated(), 2, 0, {"qp": None, "crf": 30.0}),
+}
+
+
+def _frame_set(array: CameraArray, index: int) -> FrameSet:
+    photograph = np.asarray(data.astronaut(), np.uint8)  # type: ignore[no-untyped-call]
+    pictures = {}
+    for row, col in array.real:
+        top, left = 60 + 3 * row + index, 160 + 3 * col + 2 * index
+        pictures[row, col] = photograph[top : top + array.height, left : left + array.width]
+    return FrameSet(index, round(index * 1e9 / array.fps), pictures)
+
+
+def write_case(name: str) -> bytes:
+    """The MCAP file of a case."""
+    array, count, first, settings = CASES[name]
+    config = EncoderConfig(matcher=Known(), disparity_range_px=RANGE_PX, **settings)
+    target = io.BytesIO()
+    with Encoder(array, config) as encoder, McapWriter(target) as writer:
+        for index in range(first, first + count):
+            writer.push(encoder.push(_frame_set(array, index)))
+    return target.getvalue()
+
+
+def describe(content: bytes) -> dict[str, Any]:
+    """What a conformant decoder finds: header, and each plane's CRC-32 (cropped rows, top to bottom).
+
+    Pictures are described by the planes that the video decoder puts out, which the codec's standard
+    fixes bit by bit; maps by their code values.
+    """
+    with McapReader(io.BytesIO(content)) as reader:
+        codec, array = find_codec(reader.header.codec), reader.header.array
+        decoders = {track: codec.decoder() for track in reader.header.tracks}
+        frames: list[dict[str, Any]] = []
+        for number, packet in reader.packets():
+            if number == len(frames):
+                frames.append({"index": packet.index, "time_ns": packet.time_ns, "crc32": {}})
+            if packet.track.kind is TrackKind.HEADER:
+                continue
+            (planes,) = decoders[packet.track].push(packet.data, packet.track.topic)
+            luma = planes.y[: array.height, : array.width]
+            half = (slice((array.height + 1) // 2), slice((array.width + 1) // 2))
+            chroma = [] if packet.track.kind is TrackKind.DISPARITY else [planes.u[half], planes.v[half]]
+            frames[number]["crc32"][packet.track.topic] = [zlib.crc32(p.tobytes()) for p in (luma, *chroma)]
+        return {"header": json.loads(reader.header.to_json()), "frame_sets": frames}
+
+
+def main() -> int:
+    """Write every pair into the folder named on the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path)
+    folder = parser.parse_args().folder
+    for name in CASES:
+        content = write_case(name)
+        (folder / f"{name}.mcap").write_bytes(content)
+        text = json.dumps(describe(content), indent=1)
+        (folder / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+        print(f"{name}: {len(content)} bytes")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
