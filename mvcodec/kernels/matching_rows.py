@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvcodec.frames import FloatMap, Mask
+FloatMap = NDArray[np.float32]
+Mask = NDArray[np.bool_]
 
 
 @njit(cache=True, nogil=True)

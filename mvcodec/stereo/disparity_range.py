@@ -30,6 +30,7 @@ WIDEST_SHARE = 0.45
 COARSE_WIDTH, FINE_WIDTH = 240, 480
 MIN_MATCHED_SHARE = 0.005
 
+_CAREFUL = SgbmSettings(block_size=3, uniqueness_percent=10)
 _BORDER_SHARE = 1 / 64
 _WINDOW = 5
 _MIN_CONTRAST = 2.5
@@ -41,7 +42,7 @@ _MAX_GAP_BINS = 2
 # last of those in the main run.
 _NEAR_CLUSTER, _FAR_CLUSTER = 0.0007, 0.003
 _NEAR_TAIL, _FAR_TAIL = 0.0005, 0.001
-_NEAR_MARGIN, _FAR_MARGIN = 0.08, 0.02
+_NEAR_MARGIN, _FAR_MARGIN = 0.1, 0.02
 _LEAST_MARGIN_PX = 1.0
 
 
@@ -191,7 +192,7 @@ def _shrunk(picture: Picture, width: int) -> Picture:
 
 def _sure_matches(left: Picture, right: Picture, span_px: tuple[float, float]) -> tuple[FloatMap, Mask]:
     """Left disparities, and where they are beyond doubt."""
-    raw_left, raw_right = Sgbm(SgbmSettings(uniqueness_percent=10)).raw_pair(left, right, span_px)
+    raw_left, raw_right = Sgbm(_CAREFUL).raw_pair(left, right, span_px)
     sure = left_right_check(*raw_left, *raw_right, partner_is_right=True)
     values = raw_left[0]
     height, width = values.shape
