@@ -6,23 +6,27 @@ import argparse
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
 from mvcodec.array import Viewpoint
 from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes, view
 from mvcodec.cli.progress import progress
-from mvcodec.cli.view_outputs import FORMATS, ViewGrid, check_output, make_output
 from mvcodec.container import McapReader
 from mvcodec.decoder import Decoder
-from mvcodec.errors import SettingError
+from mvcodec.errors import OutputError, SettingError
 from mvcodec.frames import DecodedSet, Picture
+from mvcodec.output.forms import FORMS, OutputPlan, ViewWriter, open_form
 from mvcodec.stream import StreamHeader
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
 
 STANDARD_INPUT = "-"
 DEFAULT_SYNTHESIZER = "layered"
+MOSAIC = "mosaic"
+MOSAIC_SUFFIXES = (".mp4", ".png")
 THREADS = 2
 
 
@@ -32,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "output", type=Path, metavar="OUT", help="a folder; for --format mosaic a .mp4 or .png file"
     )
-    parser.add_argument("--format", choices=FORMATS, help="default: array, or png with --view")
+    parser.add_argument("--format", choices=FORMS, help="default: array, or png with --view")
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
         "--grid",
@@ -62,25 +66,41 @@ def run(arguments: argparse.Namespace) -> None:
     synthesizer = make_synthesizer(arguments.synthesizer)
     form = arguments.format or ("png" if arguments.view else "array")
     if form == "array" and arguments.view:
-        raise SettingError("--view", "with --format array", "--grid RxC, since an array folder holds a grid")
+        raise SettingError("--view", "single views", "--grid RxC for --format array, which holds a grid")
     source: Path | BinaryIO = sys.stdin.buffer
     if arguments.input != STANDARD_INPUT:
         source = Path(arguments.input)
         if source.resolve() == arguments.output.resolve():
             raise SettingError("OUT", arguments.output, "another file than IN.mcap")
-    check_output(form, arguments.output)
-    with Decoder.open(source, arguments.frames) as decoder:
-        views = _view_grid(decoder.header, arguments)
-        with (
-            make_output(form, arguments.output, views) as output,
-            ThreadPoolExecutor(THREADS, "render") as pool,
-            progress("decode", _frame_total(source, arguments.frames), quiet=arguments.quiet) as bar,
-        ):
-            for decoded in decoder:
-                output.push(_render(synthesizer, decoded, views.viewpoints, pool), decoded.index)
-                bar.update()
-                if output.complete:
-                    break
+    _check_output(form, arguments.output)
+    with (
+        Decoder.open(source, arguments.frames) as decoder,
+        ThreadPoolExecutor(THREADS, "render") as pool,
+        progress("decode", _frame_total(source, arguments.frames), quiet=arguments.quiet) as bar,
+        ExitStack() as outputs,
+    ):
+        plan = _plan(decoder.header, arguments)
+        writer: ViewWriter | None = None
+        for decoded in decoder:
+            if writer is None:
+                plan = replace(plan, first_frame=decoded.index)
+                writer = outputs.enter_context(open_form(form, arguments.output, plan))
+            writer.push(_render(synthesizer, decoded, plan.viewpoints, pool))
+            bar.update()
+            if form == MOSAIC and arguments.output.suffix.lower() == ".png":
+                break  # one picture holds one frame set
+
+
+def _check_output(form: str, path: Path) -> None:
+    """Refuse what cannot be written before any work is done."""
+    if form != MOSAIC:
+        if path.exists() and not path.is_dir():
+            raise OutputError(path, f"it is a file, --format {form} needs a folder")
+    elif path.suffix.lower() not in MOSAIC_SUFFIXES:
+        expected = f"a name that ends in {' or '.join(MOSAIC_SUFFIXES)} for --format {MOSAIC}"
+        raise SettingError("OUT", path, expected)
+    elif path.is_dir():
+        raise OutputError(path, f"it is a folder, --format {MOSAIC} needs a file")
 
 
 def _render(
@@ -89,15 +109,15 @@ def _render(
     return list(pool.map(lambda viewpoint: synthesizer.render(decoded, viewpoint).pixels, viewpoints))
 
 
-def _view_grid(header: StreamHeader, arguments: argparse.Namespace) -> ViewGrid:
+def _plan(header: StreamHeader, arguments: argparse.Namespace) -> OutputPlan:
     array = header.array
-    if not arguments.view:
-        rows, cols = arguments.grid or (array.rows, array.cols)
-        return ViewGrid(array, rows, cols, array.viewpoints(rows, cols))
-    viewpoints = tuple(Viewpoint(*place) for place in arguments.view)
-    for viewpoint in viewpoints:
-        array.check_viewpoint(viewpoint)
-    return ViewGrid(array, 1, len(viewpoints), viewpoints, named_by_place=False)
+    if arguments.view:
+        viewpoints = tuple(Viewpoint(*place) for place in arguments.view)
+        for viewpoint in viewpoints:
+            array.check_viewpoint(viewpoint)
+        return OutputPlan(array, viewpoints, None)
+    grid = arguments.grid or (array.rows, array.cols)
+    return OutputPlan(array, array.viewpoints(*grid), grid)
 
 
 def _frame_total(source: Path | BinaryIO, frames: slice | None) -> int | None:

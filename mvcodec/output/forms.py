@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +18,9 @@ from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.output.mosaic import mosaic
 from mvcodec.output.pictures import viewpoint_name, write_png
 from mvcodec.output.video_file import Mp4Writer
+from mvcodec.stream import view_name
+
+_WRITERS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +45,13 @@ class OutputPlan:
             raise SettingError("viewpoints", "none", "one at least")
         if self.grid is not None and math.prod(self.grid) != len(self.viewpoints):
             raise SettingError("grid", f"{self.grid[0]}x{self.grid[1]}", f"{len(self.viewpoints)} views")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of each view's files: its place in the grid (as in the array form), or its viewpoint."""
+        if self.grid is None:
+            return tuple(viewpoint_name(viewpoint) for viewpoint in self.viewpoints)
+        return tuple(view_name(divmod(number, self.grid[1])) for number in range(len(self.viewpoints)))
 
     @property
     def layout(self) -> tuple[int, int]:
@@ -106,17 +117,19 @@ class PictureForm:
     """A folder of numbered PNG pictures for each viewpoint: ``r00_c00/000000.png``."""
 
     def __init__(self, target: Path, plan: OutputPlan) -> None:
-        self._folders = [target / viewpoint_name(viewpoint) for viewpoint in plan.viewpoints]
+        self._folders = [target / name for name in plan.names]
         self._count = 0
+        self._pool = ThreadPoolExecutor(_WRITERS, "mvcodec-write")
 
     def push(self, pictures: Sequence[Picture]) -> None:
         """See ViewWriter."""
-        for folder, picture in zip(self._folders, pictures, strict=True):
-            write_png(folder / f"{self._count:06d}.png", picture)
+        paths = [folder / f"{self._count:06d}.png" for folder in self._folders]
+        list(self._pool.map(write_png, paths, pictures))
         self._count += 1
 
     def close(self) -> None:
         """Every picture is complete already."""
+        self._pool.shutdown()
 
     def __enter__(self) -> Self:
         return self
@@ -132,19 +145,15 @@ class VideoForm:
         array = plan.array
         with ExitStack() as stack:
             self._writers = [
-                stack.enter_context(
-                    Mp4Writer(
-                        target / f"{viewpoint_name(viewpoint)}.mp4", array.width, array.height, array.fps
-                    )
-                )
-                for viewpoint in plan.viewpoints
+                stack.enter_context(Mp4Writer(target / f"{name}.mp4", array.width, array.height, array.fps))
+                for name in plan.names
             ]
+            self._pool = stack.enter_context(ThreadPoolExecutor(_WRITERS, "mvcodec-write"))
             self._resources = stack.pop_all()
 
     def push(self, pictures: Sequence[Picture]) -> None:
         """See ViewWriter."""
-        for writer, picture in zip(self._writers, pictures, strict=True):
-            writer.push(picture)
+        list(self._pool.map(Mp4Writer.push, self._writers, pictures))
 
     def close(self) -> None:
         """Finish every file."""
