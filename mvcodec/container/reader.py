@@ -79,6 +79,16 @@ class McapReader:
         """The frame sets of a complete file; None for a pipe or a file cut short."""
         return len(self._times(self.header.tracks[0])) if self._chunks.indexed else None
 
+    def frame_times(self) -> tuple[list[int], list[int]] | None:
+        """Times of a complete file's frame sets and of its keyframes, ns, ascending; else None.
+
+        Raises:
+            StreamError: the index is damaged.
+        """
+        if not self._chunks.indexed:
+            return None
+        return self._times(self.header.tracks[0]), self._times(HEADER_TRACK)
+
     def resolve(self, frames: slice | None) -> tuple[int, int | None]:
         """The first frame set of a Python slice over the file's, and the one after its last.
 
