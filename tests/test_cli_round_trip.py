@@ -21,7 +21,6 @@ from mvcodec.evaluation.metrics import psnr
 CALIBRATION = Calibration(100.0, 100.0, (WIDTH - 1) / 2, (HEIGHT - 1) / 2, 0.05)
 FRAMES = 4
 TOOLS = Path(__file__).parents[1] / "tools"
-EXAMPLE = Path(__file__).parents[1] / "examples" / "round_trip.py"
 
 
 @pytest.fixture(scope="module")
@@ -182,13 +181,6 @@ def test_launchers_are_the_same_commands(array: Path, tmp_path: Path) -> None:
     for tool, arguments in calls.items():
         subprocess.run([sys.executable, TOOLS / tool, *arguments], check=True)
     assert (tmp_path / "out" / "r01_c01" / "000000.png").is_file()
-
-
-def test_example_for_python_runs(array: Path, tmp_path: Path) -> None:
-    view = tmp_path / "view.png"
-    subprocess.run([sys.executable, EXAMPLE, array, tmp_path / "x.mcap", view], check=True)
-    assert psnr(read(view), picture((1, 1), FRAMES - 1)) > 25
-    assert len(EXAMPLE.read_text().splitlines()) < 40
 
 
 def test_sample_scene_is_an_array_like_any_other(tmp_path: Path) -> None:

@@ -1,0 +1,47 @@
+"""``mvcodec sample``: a sample scene as an array folder."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from mvcodec.capture.scene import DEFAULT_SCENE, SCENES, SceneSettings, make_scene
+from mvcodec.cli.arguments import add_output_options, pair_of_sizes, positive_int
+from mvcodec.cli.progress import progress
+from mvcodec.output.sample import write_sample
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``sample``."""
+    parser.add_argument(
+        "output", type=Path, metavar="OUTDIR", help="a folder; an existing one is written into"
+    )
+    parser.add_argument(
+        "--scene",
+        default=DEFAULT_SCENE,
+        metavar="NAME",
+        help=f"one of {', '.join(SCENES)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--grid", type=pair_of_sizes, metavar="RxC", help="rows and columns of views (default: 5x5)"
+    )
+    parser.add_argument("--frames", type=positive_int, metavar="N", help="how many (default: 24)")
+    parser.add_argument(
+        "--size", type=pair_of_sizes, metavar="WxH", help="of the pictures, px (default: 640x360)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="varies the scene (default: %(default)s)"
+    )
+    add_output_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Render and write."""
+    settings = SceneSettings(arguments.grid, arguments.frames, arguments.size, arguments.seed)
+    frames = make_scene(arguments.scene, settings).frame_count
+    with progress("render", frames, quiet=arguments.quiet) as bar:
+        scene = write_sample(arguments.output, arguments.scene, settings, lambda _done, _of: bar.update())
+    if not arguments.quiet:
+        array = scene.array
+        grid = f"{array.rows} x {array.cols} views of {array.width} x {array.height} px"
+        print(f"{arguments.output}: {frames} frame{'s' if frames > 1 else ''} of {grid}")
