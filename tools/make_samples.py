@@ -1,0 +1,47 @@
+"""Makes what lies in samples/: the scene `room` as 2 x 2 H.264 files with their array.json.
+
+    python tools/make_samples.py [FOLDER]
+
+The same versions of the libraries make the same files.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from mvcodec.array import Viewpoint
+from mvcodec.capture.scene import SceneSettings, make_scene
+from mvcodec.output.array_folder import VIDEO_PATTERN, ArrayFacts, write_manifest
+from mvcodec.output.forms import OutputPlan, VideoForm
+
+ROWS, COLS, FRAMES, SIZE = 2, 2, 12, (640, 360)
+DEFAULT_FOLDER = Path(__file__).resolve().parents[1] / "samples" / "room_2x2"
+
+
+def make_room(folder: Path) -> None:
+    """Render the scene and write one video file a view.
+
+    Raises:
+        OutputError: the system refuses.
+    """
+    scene = make_scene("room", SceneSettings(grid=(ROWS, COLS), frames=FRAMES, size=SIZE))
+    viewpoints = tuple(Viewpoint(*position) for position in scene.array.positions)
+    with VideoForm(folder, OutputPlan(scene.array, viewpoints, (ROWS, COLS))) as writer:
+        for frame in range(scene.frame_count):
+            writer.push([scene.render(viewpoint, frame)[0] for viewpoint in viewpoints])
+    facts = ArrayFacts.of(scene.array, licence=scene.licence)
+    write_manifest(folder, facts, {"pattern": VIDEO_PATTERN})
+
+
+def main() -> None:
+    """Parse the command line and make the samples."""
+    parser = argparse.ArgumentParser(description="Make the sample array in samples/.")
+    parser.add_argument("folder", type=Path, nargs="?", default=DEFAULT_FOLDER)
+    folder = parser.parse_args().folder
+    make_room(folder)
+    print(f"{folder}: {sum(path.stat().st_size for path in folder.iterdir()) / 1e6:.2f} MB")
+
+
+if __name__ == "__main__":
+    main()
