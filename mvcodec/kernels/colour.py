@@ -25,25 +25,33 @@ def rgb_to_yuv420(rgb: Plane, matrix: NDArray[np.float32], y: Plane, u: Plane, v
     `matrix` is float32 (3, 4): rows Y, Cb, Cr; columns R, G, B, offset.
     """
     height, width = y.shape
-    cb = np.empty(width + 6, np.float32)
-    cr = np.empty(width + 6, np.float32)
+    top, bottom = np.empty((3, width), np.float32), np.empty((3, width), np.float32)
+    cb, cr = np.empty(width + 6, np.float32), np.empty(width + 6, np.float32)
+    m = matrix
     for j in range(height // 2):
-        for row in (2 * j, 2 * j + 1):
-            line, out = rgb[row], y[row]
-            for x in range(width):
-                red, green, blue = np.float32(line[x, 0]), np.float32(line[x, 1]), np.float32(line[x, 2])
-                out[x] = _store(
-                    matrix[0, 0] * red + matrix[0, 1] * green + matrix[0, 2] * blue + matrix[0, 3]
-                )
-        top, bottom = rgb[2 * j], rgb[2 * j + 1]
+        _luma_row(rgb[2 * j], m, top, y[2 * j])
+        _luma_row(rgb[2 * j + 1], m, bottom, y[2 * j + 1])
         for x in range(width):
-            red = np.float32(0.5) * (np.float32(top[x, 0]) + np.float32(bottom[x, 0]))
-            green = np.float32(0.5) * (np.float32(top[x, 1]) + np.float32(bottom[x, 1]))
-            blue = np.float32(0.5) * (np.float32(top[x, 2]) + np.float32(bottom[x, 2]))
-            cb[x + 3] = matrix[1, 0] * red + matrix[1, 1] * green + matrix[1, 2] * blue + matrix[1, 3]
-            cr[x + 3] = matrix[2, 0] * red + matrix[2, 1] * green + matrix[2, 2] * blue + matrix[2, 3]
+            red = np.float32(0.5) * (top[0, x] + bottom[0, x])
+            green = np.float32(0.5) * (top[1, x] + bottom[1, x])
+            blue = np.float32(0.5) * (top[2, x] + bottom[2, x])
+            cb[x + 3] = m[1, 0] * red + m[1, 1] * green + m[1, 2] * blue + m[1, 3]
+            cr[x + 3] = m[2, 0] * red + m[2, 1] * green + m[2, 2] * blue + m[2, 3]
         _halve(cb, u[j])
         _halve(cr, v[j])
+
+
+@njit(cache=True, nogil=True)
+def _luma_row(line: Plane, m: NDArray[np.float32], channels: Row, out: Plane) -> None:
+    # Channels are taken apart first: only then does the arithmetic compile to vector instructions.
+    for x in range(out.shape[0]):
+        channels[0, x] = np.float32(line[x, 0])
+        channels[1, x] = np.float32(line[x, 1])
+        channels[2, x] = np.float32(line[x, 2])
+    for x in range(out.shape[0]):
+        out[x] = _store(
+            m[0, 0] * channels[0, x] + m[0, 1] * channels[1, x] + m[0, 2] * channels[2, x] + m[0, 3]
+        )
 
 
 @njit(cache=True, nogil=True)
@@ -86,8 +94,8 @@ def yuv420_to_rgb(y: Plane, u: Plane, v: Plane, matrix: NDArray[np.float32], rgb
     height, width = rgb.shape[0], rgb.shape[1]
     gain, offset, red_cr, green_cb, green_cr, blue_cb = matrix
     half = np.empty(u.shape[1] + 3, np.float32)
-    cb = np.empty(y.shape[1], np.float32)
-    cr = np.empty(y.shape[1], np.float32)
+    cb, cr = np.empty(y.shape[1], np.float32), np.empty(y.shape[1], np.float32)
+    red, green, blue = np.empty(width, np.uint8), np.empty(width, np.uint8), np.empty(width, np.uint8)
     last = u.shape[0] - 1
     for row in range(height):
         near = row // 2
@@ -95,8 +103,11 @@ def yuv420_to_rgb(y: Plane, u: Plane, v: Plane, matrix: NDArray[np.float32], rgb
         _double(u[near], u[far], half, cb)
         _double(v[near], v[far], half, cr)
         line, out = y[row], rgb[row]
+        # Channels are put together last, as they are taken apart first in `_luma_row`.
         for x in range(width):
             luma = gain * np.float32(line[x]) + offset
-            out[x, 0] = _store(luma + red_cr * cr[x])
-            out[x, 1] = _store(luma + green_cb * cb[x] + green_cr * cr[x])
-            out[x, 2] = _store(luma + blue_cb * cb[x])
+            red[x] = _store(luma + red_cr * cr[x])
+            green[x] = _store(luma + green_cb * cb[x] + green_cr * cr[x])
+            blue[x] = _store(luma + blue_cb * cb[x])
+        for x in range(width):
+            out[x, 0], out[x, 1], out[x, 2] = red[x], green[x], blue[x]

@@ -22,5 +22,5 @@ def quantise(values_px: FloatMap, range_px: tuple[float, float]) -> Plane:
 def dequantise(codes: Plane, range_px: tuple[float, float]) -> DisparityMap:
     """``lo + code * (hi - lo) / 255``, float32 px; every value counts as valid."""
     low, high = range_px
-    table = (low + np.arange(TOP_CODE + 1) * ((high - low) / TOP_CODE)).astype(np.float32)
-    return DisparityMap(values_px=table[codes], valid=np.ones(codes.shape, np.bool_))
+    values_px = codes * np.float32((high - low) / TOP_CODE) + np.float32(low)
+    return DisparityMap(values_px=values_px, valid=np.ones(codes.shape, np.bool_))
