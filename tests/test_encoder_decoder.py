@@ -265,6 +265,32 @@ class _BadMatcher:
         return maps
 
 
+def test_after_a_failed_frame_set_the_stream_goes_on_with_a_keyframe() -> None:
+    class Moody(RampMatcher):
+        fails = False
+
+        def match(
+            self, array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
+        ) -> dict[Position, DisparityMap]:
+            if self.fails:
+                raise RuntimeError("not today")
+            return super().match(array, pictures, range_px)
+
+    matcher = Moody()
+    with Encoder(ARRAY, config(matcher=matcher)) as encoder:
+        packets = encoder.push(frame_set(ARRAY, 0))
+        matcher.fails = True
+        with pytest.raises(RuntimeError, match="not today"):
+            encoder.push(frame_set(ARRAY, 1))
+        matcher.fails = False
+        for index in (2, 3):
+            packets += encoder.push(frame_set(ARRAY, index))
+    assert [packet.index for packet in packets if packet.track == HEADER_TRACK] == [0, 2]
+    for found in _pushed(packets):
+        for camera, original in frame_set(ARRAY, found.index).pictures.items():
+            assert luma_psnr(found.pictures[camera], original) > 36
+
+
 @pytest.mark.parametrize(
     ("shape", "message"),
     [
