@@ -6,7 +6,7 @@
 DIR is an array folder or a folder of them. Quality: the corner cameras go in uncoded, the disparity range is
 estimated, every virtual view of frame 0 is rendered and its luma compared with the original's (of a 17 x 17
 grid every 4th row and column, of a 9 x 9 one the views whose row + col is divisible by 5). Speed: see
-speed_ratios.py beside this file. Without --what, both.
+speed_ratios.py beside this file; it needs no --data (then: the sample scene). Without --what, both.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import tempfile
 import time
 import warnings
 from collections.abc import Sequence
@@ -23,13 +24,18 @@ from typing import Any
 
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture import ArraySource, open_input
+from mvcodec.capture.scene import SceneSettings
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
 from mvcodec.evaluation.quality import QualityMeter
 from mvcodec.frames import DecodedSet
+from mvcodec.output.sample import write_sample
 from mvcodec.stereo.disparity_range import estimate_range
 from mvcodec.stereo.table import make_matcher
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.table import make_synthesizer
+
+FRAMES = 8
+"""As many as speed is measured on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,22 +123,28 @@ def quality_table(sets: dict[str, ArraySource], arguments: argparse.Namespace) -
     return figures
 
 
-def speed_table(sets: dict[str, ArraySource], arguments: argparse.Namespace) -> dict[str, float]:
-    """Measure the ratios on the set that exercises most: a 2-D grid, then the most frames."""
+def speed_table(source: ArraySource, arguments: argparse.Namespace) -> dict[str, float]:
+    """Measure the ratios on one array."""
     from speed_ratios import RATIOS, measure_ratios  # noqa: PLC0415 - quality needs no codec
 
-    name, source = max(
-        sets.items(), key=lambda item: (len(item[1].array.real) == 4, min(item[1].frame_count, 8))
-    )
-    say(f"speed on {name}, {source.array.width} x {source.array.height}", arguments)
+    say(f"speed on {source.name}, {source.array.width} x {source.array.height}", arguments)
     ratios = {}
     for what, (ours, theirs) in measure_ratios(source, arguments.matcher, arguments.synthesizer).items():
         ratios[what] = ours / theirs
-        say(
-            f"{what:8} {ratios[what]:6.2f}  {ours * 1e3:9.2f} ms / {theirs * 1e3:9.2f} ms  {RATIOS[what]}",
-            arguments,
-        )
+        figures = f"{ratios[what]:6.2f}  {ours * 1e3:9.2f} ms / {theirs * 1e3:9.2f} ms"
+        say(f"{what:8} {figures}  {RATIOS[what]}", arguments)
     return ratios
+
+
+def most_telling(sets: dict[str, ArraySource]) -> ArraySource:
+    """The set to measure speed on: four corner cameras if any has them, then the most frames."""
+    return max(sets.values(), key=lambda source: (len(source.array.real), min(source.frame_count, FRAMES)))
+
+
+def rendered(folder: Path) -> ArraySource:
+    """Four cameras of the sample scene, 960 x 640."""
+    write_sample(folder, settings=SceneSettings(grid=(2, 2), frames=FRAMES, size=(960, 640)))
+    return open_input([folder])
 
 
 def say(line: str, arguments: argparse.Namespace) -> None:
@@ -157,10 +169,28 @@ def with_virtual_views(found: dict[str, Path], arguments: argparse.Namespace) ->
     return sets
 
 
+def measure(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What was asked for, in the form of ``--json``."""
+    if arguments.data is None:
+        if arguments.what != "speed":
+            raise SettingError(
+                "--data", "nothing", "an array folder or a folder of them; --what speed needs none"
+            )
+        with tempfile.TemporaryDirectory() as folder:
+            return {"ratios": speed_table(rendered(Path(folder)), arguments)}
+    document: dict[str, Any] = {}
+    sets = with_virtual_views(find_sets(arguments.data, arguments.sets), arguments)
+    if arguments.what != "speed":
+        document["sets"] = quality_table(sets, arguments)
+    if arguments.what != "quality":
+        document["ratios"] = speed_table(most_telling(sets), arguments)
+    return document
+
+
 def main() -> int:
     """Parse, measure, print."""
     parser = argparse.ArgumentParser(description="Synthesis quality and speed of mvcodec.")
-    parser.add_argument("--data", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--data", type=Path, metavar="DIR")
     parser.add_argument("--sets", type=lambda text: text.split(","), metavar="A,B")
     parser.add_argument("--what", choices=("quality", "speed"))
     parser.add_argument("--matcher", default="sgbm")
@@ -168,13 +198,8 @@ def main() -> int:
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore", MvCodecWarning)  # nominal calibration does not matter here
-    document: dict[str, Any] = {}
     try:
-        sets = with_virtual_views(find_sets(arguments.data, arguments.sets), arguments)
-        if arguments.what != "speed":
-            document["sets"] = quality_table(sets, arguments)
-        if arguments.what != "quality":
-            document["ratios"] = speed_table(sets, arguments)
+        document = measure(arguments)
     except MvCodecError as error:
         print(f"benchmark: {error}", file=sys.stderr)
         return 2 if isinstance(error, SettingError) else 1

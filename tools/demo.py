@@ -23,6 +23,7 @@ from pathlib import Path
 
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture import ArraySource, open_input
+from mvcodec.capture.scene import DEFAULT_SCENE, make_scene
 from mvcodec.cli.main import main as mvcodec
 from mvcodec.cli.progress import progress
 from mvcodec.container import StreamInfo, read_info
@@ -35,6 +36,7 @@ from mvcodec.evaluation.simulcast import Simulcast, simulcast
 from mvcodec.frames import DecodedSet, FrameSet, Picture
 from mvcodec.output.mosaic import contact_sheet, error_picture, mosaic
 from mvcodec.output.pictures import write_png
+from mvcodec.output.sample import write_sample
 from mvcodec.output.video_file import Mp4Writer
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.table import make_synthesizer
@@ -80,8 +82,8 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path = arguments.out
     out.mkdir(parents=True, exist_ok=True)
     folder = arguments.input or out / "original"
-    if arguments.input is None and (code := command("sample", folder)):
-        return code
+    if arguments.input is None:
+        render_sample(folder)
     coded = out / "array.mcap"
     if code := command("encode", folder, coded, "--qp", arguments.qp):
         return code
@@ -95,6 +97,13 @@ def run(arguments: argparse.Namespace) -> int:
     print(table(info, quality, anchor, arguments.qp))
     print("\nIn " + str(out) + ": " + ", ".join(sorted(path.name for path in out.iterdir())))
     return 0
+
+
+def render_sample(folder: Path) -> None:
+    """What ``mvcodec sample`` does, but without the exact disparity, which nothing here looks at."""
+    print(f"rendering the sample scene into {folder}", flush=True)
+    with progress("render", make_scene(DEFAULT_SCENE).frame_count) as bar:
+        write_sample(folder, progress=lambda _done, _of: bar.update(), with_truth=False)
 
 
 def command(*arguments: object) -> int:

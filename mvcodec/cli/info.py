@@ -54,6 +54,11 @@ def summary(info: StreamInfo) -> str:
     array, bits = info.header.array, info.bits.total
     rate = bits * array.fps / max(info.frames, 1)
     return (
-        f"{info.frames} frame sets of {len(array.real)} cameras, {bits / 1000:.1f} kbit"
+        f"{count(info.frames, 'frame set')} of {count(len(array.real), 'camera')}, {bits / 1000:.1f} kbit"
         f" ({rate / 1000:.1f} kbit/s; maps {info.bits.disparity / bits:.0%})"
     )
+
+
+def count(number: int, what: str) -> str:
+    """``1 camera``, ``4 cameras``."""
+    return f"{number} {what}{'s' * (number != 1)}"

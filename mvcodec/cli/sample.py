@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mvcodec.capture.scene import DEFAULT_SCENE, SCENES, SceneSettings, make_scene
 from mvcodec.cli.arguments import add_output_options, pair_of_sizes, positive_int
+from mvcodec.cli.info import count
 from mvcodec.cli.progress import progress
 from mvcodec.output.sample import write_sample
 
@@ -44,4 +45,4 @@ def run(arguments: argparse.Namespace) -> None:
     if not arguments.quiet:
         array = scene.array
         grid = f"{array.rows} x {array.cols} views of {array.width} x {array.height} px"
-        print(f"{arguments.output}: {frames} frame{'s' if frames > 1 else ''} of {grid}")
+        print(f"{arguments.output}: {count(frames, 'frame')} of {grid}")

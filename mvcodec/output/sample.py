@@ -19,6 +19,8 @@ def write_sample(
     scene: str = DEFAULT_SCENE,
     settings: SceneSettings | None = None,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    with_truth: bool = True,
 ) -> Scene:
     """Render every view of a scene into an array folder, with its exact disparity as PFM.
 
@@ -27,6 +29,7 @@ def write_sample(
         scene: a name of `capture.scene.SCENES`.
         settings: grid, frames, size and seed; the scene's own where None.
         progress: called with (frame sets written, frame sets in all).
+        with_truth: the disparity too, which takes more room than the pictures.
 
     Returns:
         The scene.
@@ -42,7 +45,7 @@ def write_sample(
             views = list(pool.map(lambda view, at=frame: _rendered(made, view, at), made.array.positions))
             pictures: dict[Position, Picture] = {view: picture for view, picture, _ in views}
             truth: dict[Position, FloatMap] = {
-                view: disparity for view, _, disparity in views if disparity is not None
+                view: disparity for view, _, disparity in views if with_truth and disparity is not None
             }
             writer.push(pictures, truth)
             if progress is not None:
