@@ -18,6 +18,7 @@ COMMANDS: dict[str, str] = {
     "sample": "render the sample scene as an array folder",
     "encode": "code an array of pictures or videos into one MCAP file",
     "decode": "decode a file and synthesise views from it",
+    "play": "watch a file in the browser, from any viewpoint",
     "info": "say what a file holds",
     "compare": "measure a decoded array against its original",
 }

@@ -1,0 +1,85 @@
+"""``mvcodec play``: watch a file in the browser, from any viewpoint."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from contextlib import suppress
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+
+from mvcodec.cli.decode import DEFAULT_SYNTHESIZER
+from mvcodec.errors import MissingExtra
+from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
+
+EXTRA = "play"
+PACKAGES = ("starlette", "uvicorn", "websockets")
+MAX_PORT = 65535
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``play``."""
+    parser.add_argument("input", type=Path, metavar="FILE.mcap")
+    parser.add_argument(
+        "--original", type=Path, metavar="ARRAY", help="array folder to measure the pictures against"
+    )
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
+    parser.add_argument("--port", type=_port, default=0, help="0 takes any free one (default: 0)")
+    parser.add_argument("--no-browser", action="store_true", help="print the URL, open no browser")
+    parser.add_argument(
+        "--synthesizer",
+        default=DEFAULT_SYNTHESIZER,
+        metavar="NAME",
+        help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--on-error",
+        choices=("skip", "stop"),
+        default="skip",
+        help="at damage, play on behind it or stop there (default: %(default)s)",
+    )
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Serve the page until Ctrl-C."""
+    for package in PACKAGES:
+        if find_spec(package) is None:
+            raise MissingExtra(package, EXTRA)
+    from mvcodec.capture import open_input  # noqa: PLC0415 - these need the extra, or much time
+    from mvcodec.player.originals import Originals  # noqa: PLC0415
+    from mvcodec.player.picture_maker import PictureMaker  # noqa: PLC0415
+    from mvcodec.player.server import Broadcast  # noqa: PLC0415
+    from mvcodec.player.serving import serve  # noqa: PLC0415
+
+    make_synthesizer(arguments.synthesizer)  # a wrong name is told before anything is opened
+    maker = PictureMaker(arguments.input, partial(make_synthesizer, arguments.synthesizer))
+    try:
+        if arguments.original is not None:
+            maker.originals = Originals(open_input([arguments.original]), maker.store.table.header.array)
+        broadcast = Broadcast(
+            maker,
+            title=arguments.input.name,
+            synthesizer=arguments.synthesizer,
+            stop_on_damage=arguments.on_error == "stop",
+        )
+        with suppress(KeyboardInterrupt):
+            serve(
+                broadcast,
+                arguments.host,
+                arguments.port,
+                on_ready=_announce,
+                open_browser=not arguments.no_browser,
+            )
+    finally:
+        maker.close()
+
+
+def _announce(url: str) -> None:
+    print(f"{url} (Ctrl-C stops)", flush=True)
+
+
+def _port(text: str) -> int:
+    if not re.fullmatch(r"\d{1,5}", text) or int(text) > MAX_PORT:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected 0..{MAX_PORT}")
+    return int(text)

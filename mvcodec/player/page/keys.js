@@ -1,0 +1,67 @@
+// The keys, in one table: it answers them and it writes the help.
+
+export function keyTable(player) {
+  const look = (name) => () => player.toggleLook(name);
+  const move = (rows, cols) => (event) => player.nudge(rows * (event.shiftKey ? 4 : 1), cols * (event.shiftKey ? 4 : 1));
+  return [
+    { keys: [" "], names: ["Space"], text: "play or pause", run: () => player.togglePlay() },
+    { keys: [","], text: "one frame back", run: () => player.step(-1) },
+    { keys: ["."], text: "one frame on", run: () => player.step(1) },
+    { keys: ["Home"], text: "first frame", run: () => player.seek(0) },
+    { keys: ["End"], text: "last frame", run: () => player.seek(Infinity) },
+    { keys: ["ArrowLeft"], names: ["←"], text: "viewpoint left (with Shift: a whole step)", run: move(0, -1) },
+    { keys: ["ArrowRight"], names: ["→"], text: "viewpoint right", run: move(0, 1) },
+    { keys: ["ArrowUp"], names: ["↑"], text: "viewpoint up", run: move(-1, 0) },
+    { keys: ["ArrowDown"], names: ["↓"], text: "viewpoint down", run: move(1, 0) },
+    { keys: ["g"], text: "to the nearest place of the grid", run: () => player.snap() },
+    { keys: ["o"], text: "loop", run: () => player.toggleLoop() },
+    { keys: ["-", "+"], text: "slower, faster", run: (event) => player.changeSpeed(event.key === "-" ? -1 : 1) },
+    { keys: ["v"], text: "plain picture", run: look("picture") },
+    { keys: ["d"], text: "disparity", run: look("disparity") },
+    { keys: ["l"], text: "depth layers", run: look("layers") },
+    { keys: ["p"], text: "provenance: how many cameras saw it", run: look("provenance") },
+    { keys: ["x"], text: "difference from the nearest real view", run: look("difference") },
+    { keys: ["m"], text: "PSNR and SSIM against the original", run: () => player.toggleMeasure() },
+    { keys: ["a"], text: "anaglyph, for red-cyan glasses", run: look("anaglyph") },
+    { keys: ["s"], text: "two eyes side by side", run: look("side-by-side") },
+    { keys: ["n"], text: "nine views", run: look("mosaic") },
+    { keys: ["[", "]"], text: "eyes nearer, farther apart", run: (event) => player.changeEyes(event.key === "[" ? -1 : 1) },
+    { keys: ["f"], text: "full screen", run: () => player.toggleFullscreen() },
+    { keys: ["h"], text: "hide the controls", run: () => player.toggleControls() },
+    { keys: ["?"], text: "these keys", run: () => player.toggleHelp() },
+  ];
+}
+
+export function listenForKeys(table, help) {
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (help.open && event.key !== "?") return;
+    if (belongsTo(event.target, event.key)) return;
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const found = table.find(({ keys }) => keys.includes(key === "=" ? "+" : key));
+    if (!found) return;
+    event.preventDefault();
+    found.run(event);
+  });
+}
+
+// A control keeps the keys that it works with.
+function belongsTo(target, key) {
+  if (target instanceof HTMLSelectElement) return key.length > 1 || key === " ";
+  if (target instanceof HTMLInputElement) return ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "PageUp", "PageDown"].includes(key);
+  return target instanceof HTMLButtonElement && (key === " " || key === "Enter");
+}
+
+export function writeHelp(list, table) {
+  for (const { keys, names = keys, text } of table) {
+    const term = document.createElement("dt");
+    for (const name of names) {
+      const kbd = document.createElement("kbd");
+      kbd.textContent = name;
+      term.append(kbd);
+    }
+    const meaning = document.createElement("dd");
+    meaning.textContent = text;
+    list.append(term, meaning);
+  }
+}

@@ -1,0 +1,331 @@
+// The player: what the viewer wants, what the server shows, and the controls between the two.
+
+import { Connection } from "./connection.js";
+import { keyTable, listenForKeys, writeHelp } from "./keys.js";
+import { drawLegend } from "./legend.js";
+import { Link, readLink } from "./link.js";
+import { ArrayMap } from "./map.js";
+import { Stage } from "./stage.js";
+import { Stats } from "./stats.js";
+
+const NUDGE = 0.25; // steps of the grid
+const EYES_STEP = 0.05;
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+const DAMAGE_MS = 10000;
+
+const LOOKS = {
+  picture: "picture",
+  disparity: "disparity",
+  layers: "layers",
+  provenance: "provenance",
+  difference: "difference",
+  anaglyph: "anaglyph",
+  "side-by-side": "side by side",
+  mosaic: "nine views",
+};
+const STEREO = ["anaglyph", "side-by-side", "mosaic"];
+
+const $ = (id) => document.getElementById(id);
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+
+class Player {
+  constructor() {
+    this.facts = null;
+    this.wanted = { frame: 0, row: null, col: null, look: "picture", eyes: null, measure: false, ...readLink() };
+    this.playback = { playing: false, speed: 1, loop: false };
+    this.shown = null;
+    this.moveDue = false;
+    this.scrubbing = false;
+    this.link = new Link();
+    this.stats = new Stats($("stats"));
+    this.map = new ArrayMap($("map"), (row, col) => this.moveTo(row, col));
+    this.stage = new Stage($("stage"), {
+      moved: (rows, cols) => this.drag(rows, cols),
+      turned: (frames) => this.turn(frames),
+    });
+    this.drawing = Promise.resolve();
+    this.connection = new Connection(this);
+    this.wire();
+  }
+
+  // What the server says
+
+  hello(facts) {
+    const first = this.facts === null;
+    this.facts = facts;
+    document.title = `${facts.title} – mvcodec`;
+    $("title").textContent = `${facts.title} · ${facts.synthesizer}`;
+    const { wanted } = this;
+    wanted.row = clamp(wanted.row ?? (facts.rows - 1) / 2, 0, facts.rows - 1);
+    wanted.col = clamp(wanted.col ?? (facts.cols - 1) / 2, 0, facts.cols - 1);
+    wanted.eyes = clamp(wanted.eyes ?? 0.5, 0, facts.cols - 1);
+    wanted.frame = clamp(wanted.frame, 0, facts.frames - 1);
+    if (!facts.looks.includes(wanted.look)) wanted.look = "picture";
+    this.map.build(facts);
+    this.fillControls();
+    const { send } = this;
+    send("move", { row: wanted.row, col: wanted.col });
+    send("seek", { frame: wanted.frame });
+    send("show", { look: wanted.look });
+    send("eyes", { steps: wanted.eyes });
+    send("measure", { measure: wanted.measure });
+    send("speed", { factor: this.playback.speed });
+    send("loop", { loop: this.playback.loop });
+    if (!first && this.playback.playing) send("play", { playing: true });
+    send("ready");
+    $("connection").hidden = true;
+    document.body.classList.remove("away");
+    if (!first) this.say("Connected again");
+    if (facts.cut_off) this.warn(facts.cut_off);
+  }
+
+  send = (type, fields) => this.connection.send(type, fields);
+
+  state({ playing, speed, loop }) {
+    this.playback = { playing, speed, loop };
+    this.showPlayback();
+  }
+
+  trouble({ message }) {
+    this.warn(message);
+  }
+
+  picture(facts, blob) {
+    // One after the other: two bitmaps decoded at once may be done in the wrong order.
+    this.drawing = this.drawing
+      .then(() => this.stage.draw(blob))
+      .then(() => {
+        this.shown = facts;
+        this.send("shown", { picture: facts.picture });
+        this.stats.note(facts);
+        this.showFacts();
+      });
+  }
+
+  away(reason) {
+    $("connection").textContent = `${reason} Trying again …`;
+    $("connection").hidden = false;
+    document.body.classList.add("away");
+  }
+
+  // What the viewer wants
+
+  drag(rows, cols) {
+    const { facts, wanted } = this;
+    if (facts) this.moveTo(wanted.row + rows * (facts.rows - 1), wanted.col + cols * (facts.cols - 1));
+  }
+
+  nudge(rows, cols) {
+    const { wanted } = this;
+    this.moveTo(wanted.row + NUDGE * rows, wanted.col + NUDGE * cols);
+    this.say(`row ${wanted.row.toFixed(2)}, column ${wanted.col.toFixed(2)}`);
+  }
+
+  snap() {
+    this.moveTo(Math.round(this.wanted.row), Math.round(this.wanted.col));
+  }
+
+  moveTo(row, col) {
+    const { facts, wanted } = this;
+    if (!facts) return;
+    wanted.row = clamp(row, 0, facts.rows - 1);
+    wanted.col = clamp(col, 0, facts.cols - 1);
+    if (this.moveDue) return;
+    // The latest place wins: one message for each picture of the screen at most.
+    this.moveDue = true;
+    requestAnimationFrame(() => {
+      this.moveDue = false;
+      this.send("move", { row: wanted.row, col: wanted.col });
+      this.map.show(this.shown ?? wanted, wanted);
+    });
+  }
+
+  togglePlay() {
+    this.send("play", { playing: !this.playback.playing });
+  }
+
+  step(frames) {
+    this.send("step", { frames });
+  }
+
+  turn(frames) {
+    if (this.playback.playing) this.send("play", { playing: false });
+    this.step(frames);
+  }
+
+  seek(frame) {
+    if (!this.facts) return;
+    this.send("seek", { frame: clamp(frame, 0, this.facts.frames - 1) });
+  }
+
+  toggleLoop() {
+    this.send("loop", { loop: !this.playback.loop });
+  }
+
+  setSpeed(factor) {
+    this.send("speed", { factor });
+  }
+
+  changeSpeed(by) {
+    const place = SPEEDS.findIndex((speed) => speed >= this.playback.speed);
+    this.setSpeed(SPEEDS[clamp(place + by, 0, SPEEDS.length - 1)]);
+  }
+
+  toggleLook(look) {
+    this.setLook(this.wanted.look === look ? "picture" : look);
+  }
+
+  setLook(look) {
+    this.wanted.look = look;
+    this.send("show", { look });
+    this.say(LOOKS[look]);
+    this.showLook();
+  }
+
+  changeEyes(by) {
+    this.setEyes(this.wanted.eyes + by * EYES_STEP);
+  }
+
+  setEyes(steps) {
+    if (!this.facts) return;
+    this.wanted.eyes = clamp(Math.round(steps / EYES_STEP) * EYES_STEP, 0, this.facts.cols - 1);
+    this.send("eyes", { steps: this.wanted.eyes });
+    this.showLook();
+  }
+
+  toggleMeasure() {
+    if (!this.facts?.measurable) {
+      this.warn("There is nothing to measure against: start with --original ARRAY");
+      return;
+    }
+    this.wanted.measure = !this.wanted.measure;
+    this.send("measure", { measure: this.wanted.measure });
+    $("measure").setAttribute("aria-pressed", this.wanted.measure);
+  }
+
+  toggleFullscreen() {
+    if (document.fullscreenElement) document.exitFullscreen();
+    else document.documentElement.requestFullscreen().catch(() => this.warn("This browser refuses full screen"));
+  }
+
+  toggleControls() {
+    document.body.classList.toggle("bare");
+  }
+
+  toggleHelp() {
+    if ($("help").open) $("help").close();
+    else $("help").showModal();
+  }
+
+  followLink() {
+    const link = readLink();
+    if (!this.facts || location.hash === this.link.wanted) return;
+    if (link.frame !== undefined) this.seek(link.frame);
+    if (link.row !== undefined) this.moveTo(link.row, link.col);
+    if (link.eyes !== undefined) this.setEyes(link.eyes);
+    if (link.look === undefined || link.look in LOOKS) this.setLook(link.look ?? "picture");
+  }
+
+  // What is on the screen
+
+  fillControls() {
+    const { facts } = this;
+    $("timeline").max = facts.frames - 1;
+    $("look").replaceChildren(...facts.looks.map((look) => new Option(LOOKS[look] ?? look, look)));
+    $("eyes").max = facts.cols - 1;
+    $("eyes").disabled = facts.cols === 1;
+    $("measure").hidden = !facts.measurable;
+    $("measure").setAttribute("aria-pressed", this.wanted.measure);
+    this.showLook();
+    this.showPlayback();
+  }
+
+  showLook() {
+    const { look, eyes } = this.wanted;
+    $("look").value = look;
+    $("eyes-box").hidden = !STEREO.includes(look);
+    $("eyes").value = eyes;
+    $("eyes-value").textContent = eyes.toFixed(2);
+  }
+
+  showPlayback() {
+    const { playing, speed, loop } = this.playback;
+    const button = $("play");
+    button.setAttribute("aria-pressed", playing);
+    button.setAttribute("aria-label", playing ? "Pause" : "Play");
+    button.title = playing ? "Pause (space)" : "Play (space)";
+    $("loop").setAttribute("aria-pressed", loop);
+    $("speed").value = String(speed);
+  }
+
+  showFacts() {
+    const { facts, shown, wanted } = this;
+    wanted.frame = shown.frame;
+    const other = shown.index !== shown.frame && !shown.damage ? ` (${shown.index} of the input)` : "";
+    $("frame").textContent = `frame ${shown.frame} of ${facts.frames - 1}${other}`;
+    $("time").textContent = `${shown.time_s.toFixed(3)} s`;
+    $("viewpoint").textContent = `view ${shown.row.toFixed(2)}, ${shown.col.toFixed(2)}`;
+    if (!this.scrubbing) $("timeline").value = shown.frame;
+    $("timeline").setAttribute("aria-valuetext", `frame ${shown.frame}, ${shown.time_s.toFixed(3)} seconds`);
+    this.map.show(shown, wanted);
+    drawLegend($("legend"), shown.legend);
+    this.showQuality(shown.quality);
+    this.showDamage(shown);
+    this.link.write({ ...shown, eyes: wanted.eyes }, STEREO.includes(shown.look));
+    document.body.dataset.look = shown.look;
+  }
+
+  showQuality(quality) {
+    $("quality").hidden = !quality;
+    document.body.classList.toggle("measured", Boolean(quality));
+    if (!quality) return;
+    const ssim = quality.ssim === null ? "" : ` · SSIM ${quality.ssim.toFixed(4)}`;
+    $("quality").textContent = quality.reason ?? `PSNR ${quality.psnr_db.toFixed(2)} dB${ssim}`;
+  }
+
+  showDamage({ damage, frame }) {
+    if (!damage) return;
+    const on = damage.goes_on_s === null ? "to the end" : `until ${damage.goes_on_s.toFixed(3)} s`;
+    this.warn(`frame ${frame} cannot be decoded (from ${damage.time_s.toFixed(3)} s ${on}); the nearest whole one is shown. ${damage.message}`);
+  }
+
+  warn(text) {
+    if ($("damage-text").textContent !== text) $("damage-text").textContent = text;
+    $("damage").hidden = false;
+    clearTimeout(this.warning);
+    this.warning = setTimeout(() => ($("damage").hidden = true), DAMAGE_MS);
+  }
+
+  say(text) {
+    $("spoken").textContent = text;
+  }
+
+  wire() {
+    const click = (id, action) => $(id).addEventListener("click", action);
+    click("play", () => this.togglePlay());
+    click("back", () => this.step(-1));
+    click("on", () => this.step(1));
+    click("loop", () => this.toggleLoop());
+    click("measure", () => this.toggleMeasure());
+    click("open-help", () => this.toggleHelp());
+    click("fullscreen", () => this.toggleFullscreen());
+    click("damage-close", () => ($("damage").hidden = true));
+    $("speed").addEventListener("change", () => this.setSpeed(Number($("speed").value)));
+    $("look").addEventListener("change", () => this.setLook($("look").value));
+    $("eyes").addEventListener("input", () => this.setEyes(Number($("eyes").value)));
+    $("timeline").addEventListener("input", () => {
+      this.scrubbing = true;
+      this.seek(Number($("timeline").value));
+    });
+    $("timeline").addEventListener("change", () => (this.scrubbing = false));
+    document.addEventListener("fullscreenchange", () => $("fullscreen").setAttribute("aria-pressed", Boolean(document.fullscreenElement)));
+    window.addEventListener("hashchange", () => this.followLink());
+    const table = keyTable(this);
+    listenForKeys(table, $("help"));
+    writeHelp($("keys"), table);
+    const controls = $("controls");
+    new ResizeObserver(() => document.documentElement.style.setProperty("--controls", `${controls.offsetHeight}px`)).observe(controls);
+  }
+}
+
+new Player();

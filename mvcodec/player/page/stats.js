@@ -1,0 +1,50 @@
+// What playing costs: pictures drawn in the last second, and the milliseconds of the last pictures.
+
+const WINDOW_MS = 1000;
+const LAST = 8;
+
+export class Stats {
+  constructor(element) {
+    this.element = element;
+    this.drawn = [];
+    this.recent = [];
+    this.facts = null;
+    setInterval(() => this.write(), 250);
+  }
+
+  note(facts) {
+    this.drawn.push(performance.now());
+    this.recent.push(facts);
+    if (this.recent.length > LAST) this.recent.shift();
+    this.facts = facts;
+  }
+
+  get fps() {
+    const now = performance.now();
+    this.drawn = this.drawn.filter((time) => now - time <= WINDOW_MS);
+    return this.drawn.length;
+  }
+
+  write() {
+    if (!this.facts) return;
+    const ms = (name) => {
+      const values = this.recent.map((facts) => facts[name]).filter((value) => typeof value === "number");
+      return values.length ? Math.round(values.reduce((sum, value) => sum + value, 0) / values.length) : "–";
+    };
+    const parts = [
+      `${this.fps} pictures/s`,
+      `decode ${ms("decode_ms")}`,
+      `synthesis ${ms("synthesis_ms")}`,
+      `encode ${ms("encode_ms")}`,
+      `transfer ${ms("transfer_ms")} ms`,
+      `dropped ${this.facts.dropped}`,
+    ];
+    this.element.replaceChildren(
+      ...parts.map((text) => {
+        const span = document.createElement("span");
+        span.textContent = text;
+        return span;
+      }),
+    );
+  }
+}

@@ -1,0 +1,147 @@
+"""Requests in, JPEG pictures out, with what it cost and what must be said about them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from mvcodec.array import Viewpoint
+from mvcodec.errors import StreamError
+from mvcodec.frames import DecodedSet, Picture, RenderedView
+from mvcodec.player.frame_store import Damage, FrameStore, StoredFrame
+from mvcodec.player.looks import LOOKS
+from mvcodec.player.originals import Originals
+from mvcodec.player.session import PictureRequest
+from mvcodec.player.synthesizers import SynthesizerPool
+from mvcodec.synthesis.synthesizer import Synthesizer
+
+WORKERS = 2
+JPEG_QUALITY = 90
+
+
+@dataclass(frozen=True, slots=True)
+class MadePicture:
+    """A picture and its facts.
+
+    Attributes:
+        jpeg: the coded picture.
+        facts: plain JSON values: what is shown, what it cost in ms, legend, damage, quality.
+        damaged: it stands in for a frame that cannot be decoded.
+    """
+
+    jpeg: bytes
+    facts: dict[str, Any]
+    damaged: bool
+
+
+class PictureMaker:
+    """Makes pictures of one file, in as many as `WORKERS` threads at once.
+
+    Args:
+        path: the file.
+        make_synthesizer: makes one synthesizer.
+
+    Attributes:
+        store: the file's frame sets.
+        originals: to measure against; None at first.
+
+    Raises:
+        InputError, StreamError: as `FrameStore`.
+    """
+
+    def __init__(self, path: Path, make_synthesizer: Callable[[], Synthesizer]) -> None:
+        self.store = FrameStore(path)
+        self.originals: Originals | None = None
+        self._synthesizers = SynthesizerPool(make_synthesizer, WORKERS)
+        self._ahead = ThreadPoolExecutor(1, "decode-ahead")
+        self._decoding: Future[StoredFrame] | None = None
+
+    def make(self, request: PictureRequest, next_frame: int | None = None) -> MadePicture:
+        """Decode, render, compose and code one picture.
+
+        Args:
+            next_frame: decoded meanwhile, since it will be asked for next.
+
+        Raises:
+            StreamError: no frame of the file can be decoded.
+            InputError: the original's picture cannot be read.
+        """
+        stored = self.store.fetch(request.frame)
+        if stored.decoded is None:
+            raise StreamError(
+                self.store.path, stored.damage.message if stored.damage else "no frame", "a frame"
+            )
+        if next_frame is not None:
+            self._decode_ahead(next_frame)
+        decoded, look = stored.decoded, LOOKS[request.look]
+        start = time.perf_counter()
+        viewpoints = look.place(decoded.array, request.viewpoint, request.eye_steps)
+        views = self._render(decoded, viewpoints)
+        rendered = time.perf_counter()
+        picture, legend = look.compose(decoded, views)
+        jpeg = _jpeg(picture)
+        done = time.perf_counter()
+        facts = {
+            "frame": request.frame,
+            "index": decoded.index,
+            "time_s": self.store.table.times_ns[request.frame] / 1e9,
+            "row": request.viewpoint.row,
+            "col": request.viewpoint.col,
+            "look": request.look,
+            "legend": legend or None,
+            "decode_ms": round(stored.decode_ms, 2),
+            "synthesis_ms": round(1000 * (rendered - start), 2),
+            "encode_ms": round(1000 * (done - rendered), 2),
+            "damage": stored.damage and self._describe(stored.damage),
+            "quality": self._measure(request, decoded, views),
+        }
+        return MadePicture(jpeg, facts, stored.damage is not None)
+
+    def close(self) -> None:
+        """Let go of the file; waits for pictures being made ahead."""
+        self._ahead.shutdown(cancel_futures=True)
+        self.store.close()
+
+    def _render(self, decoded: DecodedSet, viewpoints: tuple[Viewpoint, ...]) -> list[RenderedView]:
+        with self._synthesizers.borrow(decoded) as synthesizer:
+            return [synthesizer.render(decoded, viewpoint) for viewpoint in viewpoints]
+
+    def _decode_ahead(self, frame: int) -> None:
+        # One at a time: with many viewers it is a help to none if it queues up.
+        if self._decoding is None or self._decoding.done():
+            self._decoding = self._ahead.submit(self.store.fetch, frame)
+
+    def _measure(
+        self, request: PictureRequest, decoded: DecodedSet, views: list[RenderedView]
+    ) -> dict[str, Any] | None:
+        if self.originals is None or not request.measure or len(views) != 1:
+            return None
+        return asdict(self.originals.measure(decoded, views[0]))
+
+    def _describe(self, damage: Damage) -> dict[str, Any]:
+        times, goes_on = self.store.table.times_ns, damage.end < self.store.table.count
+        return {
+            "first": damage.first,
+            "end": damage.end,
+            "time_s": times[damage.first] / 1e9,
+            "goes_on_s": times[damage.end] / 1e9 if goes_on else None,
+            "message": damage.message,
+        }
+
+
+def _jpeg(picture: Picture) -> bytes:
+    # Full chroma: overlays and anaglyphs live by their colours.
+    options = [
+        cv2.IMWRITE_JPEG_QUALITY,
+        JPEG_QUALITY,
+        cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
+        cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
+    ]
+    _, data = cv2.imencode(".jpg", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), options)
+    return data.tobytes()

@@ -1,0 +1,247 @@
+"""The web server: the page's files and one WebSocket a viewer. Everything else is refused."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import struct
+import time
+from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from mvcodec.errors import InputError, MvCodecError
+from mvcodec.player.access import AccessRules
+from mvcodec.player.looks import LOOKS
+from mvcodec.player.messages import parse_message
+from mvcodec.player.picture_maker import WORKERS, MadePicture, PictureMaker
+from mvcodec.player.session import Session
+
+MAX_VIEWERS = 32
+
+CLOSE_MALFORMED = 1008
+CLOSE_BUSY = 1013
+CLOSE_BROKEN = 1011
+
+PAGE_TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
+
+PAGE_HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-cache",
+}
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Broadcast:
+    """What is served.
+
+    Attributes:
+        maker: of the file's pictures.
+        title: the file's name.
+        synthesizer: its name, for the page to show.
+        stop_on_damage: see `Session`.
+    """
+
+    maker: PictureMaker
+    title: str
+    synthesizer: str
+    stop_on_damage: bool = False
+
+
+def make_app(broadcast: Broadcast, rules: AccessRules) -> ASGIApp:
+    """The application: the page at ``/``, its files, and the WebSocket at ``/view``."""
+    viewers = _Viewers(broadcast)
+    routes: list[Route | WebSocketRoute] = [
+        Route("/" if name == "index.html" else f"/{name}", _page_file(name)) for name in _page_names()
+    ]
+    routes.append(WebSocketRoute("/view", viewers.serve))
+    return _Guard(Starlette(routes=routes), rules)
+
+
+class _Guard:
+    """Refuses what the access rules refuse, before anything else looks at it."""
+
+    def __init__(self, app: ASGIApp, rules: AccessRules) -> None:
+        self._app, self._rules = app, rules
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] in ("http", "websocket"):
+            headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
+            host = headers.get(b"host")
+            allowed = self._rules.allows_host(host)
+            if scope["type"] == "websocket":
+                allowed = allowed and self._rules.allows_origin(headers.get(b"origin"), host)
+            if not allowed:
+                await _refuse(scope, receive, send)
+                return
+        await self._app(scope, receive, send)
+
+
+async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": CLOSE_MALFORMED})
+    else:
+        await PlainTextResponse("refused: unknown Host\n", 403)(scope, receive, send)
+
+
+def _page_names() -> list[str]:
+    page = files("mvcodec.player").joinpath("page")
+    return sorted(item.name for item in page.iterdir() if item.name[item.name.rfind(".") :] in PAGE_TYPES)
+
+
+def _page_file(name: str) -> Callable[[Request], Awaitable[Response]]:
+    content = files("mvcodec.player").joinpath("page", name).read_bytes()
+    media_type = PAGE_TYPES[name[name.rfind(".") :]]
+
+    async def endpoint(_request: Request) -> Response:
+        return Response(content, media_type=media_type, headers=PAGE_HEADERS)
+
+    return endpoint
+
+
+class _Viewers:
+    """Everyone who watches, and the threads that work for them."""
+
+    def __init__(self, broadcast: Broadcast) -> None:
+        self._broadcast = broadcast
+        self._count = 0
+        self._pool = ThreadPoolExecutor(WORKERS, "picture")
+
+    async def serve(self, socket: WebSocket) -> None:
+        """One viewer, from the handshake to the end."""
+        await socket.accept()
+        if self._count >= MAX_VIEWERS:
+            await socket.close(CLOSE_BUSY, f"{MAX_VIEWERS} viewers are watching already")
+            return
+        self._count += 1
+        try:
+            await _Viewer(socket, self._broadcast, self._pool).run()
+        finally:
+            self._count -= 1
+
+
+class _Viewer:
+    """One connection: reads messages into the session and sends the pictures that it asks for."""
+
+    def __init__(self, socket: WebSocket, broadcast: Broadcast, pool: ThreadPoolExecutor) -> None:
+        self._socket, self._broadcast, self._pool = socket, broadcast, pool
+        table = broadcast.maker.store.table
+        self._session = Session(table.header.array, table.count, stop_on_damage=broadcast.stop_on_damage)
+        self._news = asyncio.Event()
+        self._stated: dict[str, Any] | None = None
+
+    async def run(self) -> None:
+        sender = asyncio.create_task(self._send())
+        reader = asyncio.create_task(self._read())
+        try:
+            await asyncio.wait({sender, reader}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in (sender, reader):
+                task.cancel()
+            results = await asyncio.gather(sender, reader, return_exceptions=True)
+        for error in results:
+            if isinstance(error, Exception) and not isinstance(error, WebSocketDisconnect):
+                await self._close_after(error)
+
+    async def _close_after(self, error: Exception) -> None:
+        """Close this connection, and nothing else, saying why."""
+        code = CLOSE_MALFORMED if isinstance(error, InputError) else CLOSE_BROKEN
+        if code == CLOSE_BROKEN:
+            _log.error("a viewer's connection broke", exc_info=error)
+        # The reason of a close frame has 123 bytes at most.
+        reason = str(error).encode()[:120].decode(errors="ignore")
+        with suppress(RuntimeError, WebSocketDisconnect):  # the viewer has gone already
+            await self._socket.close(code, reason)
+
+    async def _read(self) -> None:
+        while True:
+            event = await self._socket.receive()
+            if event["type"] == "websocket.disconnect":
+                raise WebSocketDisconnect(event.get("code", 1006))
+            text = event.get("text")
+            self._session.apply(parse_message(text if text is not None else b""), time.monotonic())
+            self._news.set()
+
+    async def _send(self) -> None:
+        await self._socket.send_text(json.dumps(self._greeting()))
+        session, loop = self._session, asyncio.get_running_loop()
+        while True:
+            self._news.clear()
+            request = session.next_request(time.monotonic())
+            await self._send_state()
+            if request is None:
+                wait_s = session.seconds_to_next(time.monotonic())
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(self._news.wait(), wait_s)
+                continue
+            make = self._broadcast.maker.make
+            try:
+                made = await loop.run_in_executor(self._pool, make, request, session.next_frame())
+            except MvCodecError as error:
+                trouble = {"type": "trouble", "message": str(error), "frame": request.frame}
+                await self._socket.send_text(json.dumps(trouble))
+                continue
+            await self._send_picture(made)
+
+    async def _send_picture(self, made: MadePicture) -> None:
+        """A picture's message: big-endian uint32 length of the facts, the facts as JSON, the JPEG."""
+        session = self._session
+        facts = made.facts | {
+            "picture": session.sent(time.monotonic(), damaged=made.damaged),
+            "transfer_ms": session.transfer_ms,
+            "dropped": session.dropped,
+        }
+        head = json.dumps(facts, separators=(",", ":")).encode()
+        await self._socket.send_bytes(struct.pack(">I", len(head)) + head + made.jpeg)
+
+    async def _send_state(self) -> None:
+        state = self._session.state
+        if state != self._stated:
+            self._stated = state
+            await self._socket.send_text(json.dumps({"type": "state"} | state))
+
+    def _greeting(self) -> dict[str, Any]:
+        broadcast = self._broadcast
+        table = broadcast.maker.store.table
+        array = table.header.array
+        return {
+            "type": "hello",
+            "title": broadcast.title,
+            "rows": array.rows,
+            "cols": array.cols,
+            "real": [list(camera) for camera in array.real],
+            "width": array.width,
+            "height": array.height,
+            "fps": array.fps,
+            "frames": table.count,
+            "first_s": table.times_ns[0] / 1e9,
+            "last_s": table.times_ns[-1] / 1e9,
+            "looks": list(LOOKS),
+            "synthesizer": broadcast.synthesizer,
+            "measurable": broadcast.maker.originals is not None,
+            "cut_off": table.cut_off,
+        }

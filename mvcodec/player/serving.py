@@ -1,0 +1,84 @@
+"""Runs the server until it is interrupted."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import warnings
+import webbrowser
+from collections.abc import Callable
+
+import uvicorn
+
+from mvcodec.errors import MvCodecWarning, OutputError
+from mvcodec.player.access import AccessRules, is_loopback
+from mvcodec.player.messages import MAX_MESSAGE_BYTES
+from mvcodec.player.server import Broadcast, make_app
+
+GRACE_S = 2
+"""How long an interrupted server waits for its viewers' connections to close."""
+
+
+def serve(
+    broadcast: Broadcast,
+    host: str,
+    port: int,
+    *,
+    on_ready: Callable[[str], object],
+    open_browser: bool = False,
+) -> None:
+    """Serve until Ctrl-C or SIGTERM.
+
+    Args:
+        host: address or name to bind to; beyond loopback it is warned about.
+        port: 0 takes any free one.
+        on_ready: called with the page's URL once the port is bound.
+        open_browser: show the page in the default browser.
+
+    Raises:
+        OutputError: the address cannot be bound.
+    """
+    listener = _bind(host, port)
+    with listener:
+        url = _url(host, listener.getsockname()[1])
+        if not is_loopback(host):
+            text = f"--host {host}: everyone who reaches this machine over the network can watch this file"
+            warnings.warn(text, MvCodecWarning, stacklevel=2)
+        config = uvicorn.Config(
+            make_app(broadcast, AccessRules(host)),
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            ws="websockets-sansio",
+            ws_max_size=MAX_MESSAGE_BYTES,
+            # Pictures are compressed already.
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=GRACE_S,
+        )
+        on_ready(url)
+        if open_browser:
+            threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+        uvicorn.Server(config).run(sockets=[listener])
+
+
+def _bind(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listener = socket.socket(family, kind, protocol)
+        try:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listener.bind(address)
+            listener.listen()
+        except BaseException:
+            listener.close()
+            raise
+    except OSError as error:
+        raise OutputError(f"--host {host} --port {port}", error.strerror or error) from None
+    return listener
+
+
+def _url(host: str, port: int) -> str:
+    shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+    return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"

@@ -1,0 +1,153 @@
+"""One viewer's state: messages come in, requests for pictures go out. Knows nothing of the web.
+
+The latest state wins: whatever was asked for and overtaken before a picture was begun is never rendered, and
+at most `MAX_IN_FLIGHT` pictures wait to be drawn, so that nothing can queue up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from mvcodec.array import CameraArray, Viewpoint
+from mvcodec.player.clock import PlayClock
+from mvcodec.player.looks import LOOKS
+from mvcodec.player.messages import (
+    Eyes,
+    Loop,
+    Measure,
+    Message,
+    Move,
+    Play,
+    Ready,
+    Seek,
+    Show,
+    Shown,
+    Speed,
+    Step,
+)
+
+MAX_IN_FLIGHT = 2
+
+
+@dataclass(frozen=True, slots=True)
+class PictureRequest:
+    """All that decides what a picture shows.
+
+    Attributes:
+        frame: of the file, from 0.
+        viewpoint: within the array.
+        look: a name of LOOKS.
+        eye_steps: distance of two eyes in steps of the grid; 0 where the look is for one.
+        measure: against the original.
+    """
+
+    frame: int
+    viewpoint: Viewpoint
+    look: str = "picture"
+    eye_steps: float = 0.0
+    measure: bool = False
+
+
+class Session:
+    """The state machine of one viewer. Times are seconds of any monotonic clock.
+
+    Args:
+        array: the geometry; viewpoints are kept within it.
+        frame_count: of the file.
+        stop_on_damage: playback stops at a damaged frame instead of going on behind it.
+    """
+
+    def __init__(self, array: CameraArray, frame_count: int, *, stop_on_damage: bool = False) -> None:
+        self._array = array
+        self._stop_on_damage = stop_on_damage
+        self._clock = PlayClock(frame_count, array.fps)
+        middle = Viewpoint((array.rows - 1) / 2, (array.cols - 1) / 2)
+        self._wanted = PictureRequest(0, middle)
+        self._eye_steps = min(0.5, array.cols - 1)
+        self._last: PictureRequest | None = None
+        self._ready = False
+        self._sent = 0
+        self._in_flight: dict[int, float] = {}
+        self.transfer_ms: float | None = None
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """What the page must know of playback, as plain JSON values."""
+        clock = self._clock
+        return {"playing": clock.playing, "speed": clock.speed, "loop": clock.loop}
+
+    @property
+    def dropped(self) -> int:
+        """Frames that were due and not shown, since the start."""
+        return self._clock.dropped
+
+    def apply(self, message: Message, now_s: float) -> None:
+        """Take one message from the page."""
+        clock = self._clock
+        match message:
+            case Ready():
+                self._ready = True
+            case Move(viewpoint):
+                self._wanted = replace(self._wanted, viewpoint=self._inside(viewpoint))
+            case Seek(frame):
+                clock.seek(frame, now_s)
+            case Step(frames):
+                clock.play(False, now_s)
+                clock.seek(clock.frame + frames, now_s)
+            case Play(playing):
+                clock.play(playing, now_s)
+            case Speed(factor):
+                clock.set_speed(factor, now_s)
+            case Loop(loop):
+                clock.loop = loop
+            case Show(look):
+                self._wanted = replace(self._wanted, look=look)
+            case Eyes(steps):
+                self._eye_steps = min(max(steps, 0.0), float(self._array.cols - 1))
+            case Measure(measure):
+                self._wanted = replace(self._wanted, measure=measure)
+            case Shown(picture):
+                self._note_shown(picture, now_s)
+
+    def next_request(self, now_s: float) -> PictureRequest | None:
+        """The picture to make now; None while there is nothing new, or the page is still busy."""
+        if not self._ready or len(self._in_flight) >= MAX_IN_FLIGHT:
+            return None
+        eye_steps = self._eye_steps if LOOKS[self._wanted.look].stereo else 0.0
+        request = replace(self._wanted, frame=self._clock.advance(now_s), eye_steps=eye_steps)
+        if request == self._last:
+            return None
+        self._last = request
+        return request
+
+    def next_frame(self) -> int | None:
+        """The frame that playback will want after the last request; None while paused."""
+        if not self._clock.playing or self._last is None:
+            return None
+        return self._clock.following(self._last.frame)
+
+    def seconds_to_next(self, now_s: float) -> float | None:
+        """How long until `next_request` may have news without a message; None: not before one."""
+        if not self._ready or len(self._in_flight) >= MAX_IN_FLIGHT:
+            return None
+        return self._clock.seconds_to_next(now_s)
+
+    def sent(self, now_s: float, *, damaged: bool = False) -> int:
+        """Note that a picture leaves now; returns its number, from 1, which the page repeats in `Shown`."""
+        self._sent += 1
+        self._in_flight[self._sent] = now_s
+        if damaged and self._stop_on_damage:
+            self._clock.play(False, now_s)
+        return self._sent
+
+    def _note_shown(self, picture: int, now_s: float) -> None:
+        sent_s = self._in_flight.pop(picture, None)
+        if sent_s is not None:
+            self.transfer_ms = 1000 * (now_s - sent_s)
+
+    def _inside(self, viewpoint: Viewpoint) -> Viewpoint:
+        array = self._array
+        row = min(max(viewpoint.row, 0.0), array.rows - 1.0)
+        col = min(max(viewpoint.col, 0.0), array.cols - 1.0)
+        return Viewpoint(row, col)
