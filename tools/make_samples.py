@@ -8,14 +8,16 @@ The same versions of the libraries make the same files.
 from __future__ import annotations
 
 import argparse
+from contextlib import ExitStack
 from pathlib import Path
 
 from mvcodec.array import Viewpoint
 from mvcodec.capture.scene import SceneSettings, make_scene
 from mvcodec.output.array_folder import VIDEO_PATTERN, ArrayFacts, write_manifest
-from mvcodec.output.forms import OutputPlan, VideoForm
+from mvcodec.output.video_file import Mp4Writer
 
 ROWS, COLS, FRAMES, SIZE = 2, 2, 12, (640, 360)
+CRF = 8.0
 DEFAULT_FOLDER = Path(__file__).resolve().parents[1] / "samples" / "room_2x2"
 
 
@@ -26,11 +28,18 @@ def make_room(folder: Path) -> None:
         OutputError: the system refuses.
     """
     scene = make_scene("room", SceneSettings(grid=(ROWS, COLS), frames=FRAMES, size=SIZE))
-    viewpoints = tuple(Viewpoint(*position) for position in scene.array.positions)
-    with VideoForm(folder, OutputPlan(scene.array, viewpoints, (ROWS, COLS))) as writer:
+    array = scene.array
+    with ExitStack() as stack:
+        writers = {
+            (row, col): stack.enter_context(
+                Mp4Writer(folder / VIDEO_PATTERN.format(row=row, col=col), *SIZE, array.fps, crf=CRF)
+            )
+            for row, col in array.positions
+        }
         for frame in range(scene.frame_count):
-            writer.push([scene.render(viewpoint, frame)[0] for viewpoint in viewpoints])
-    facts = ArrayFacts.of(scene.array, licence=scene.licence)
+            for view, writer in writers.items():
+                writer.push(scene.render(Viewpoint(*view), frame)[0])
+    facts = ArrayFacts.of(array, licence=scene.licence)
     write_manifest(folder, facts, {"pattern": VIDEO_PATTERN})
 
 

@@ -6,10 +6,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 
-from mvcodec.capture.pictures import read_pixels
+from mvcodec.capture.pictures import read_grey
 from mvcodec.errors import InputError
 from mvcodec.frames import DisparityMap, FloatMap
 
@@ -69,10 +68,7 @@ def read_map(path: Path) -> FloatMap:
     """
     if path.suffix.lower() == ".pfm":
         return read_pfm(path)
-    values = read_pixels(path, cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION)
-    if values.ndim != 2:
-        raise InputError(path, f"{values.shape[2]} channels", "a disparity map of one channel")
-    return values.astype(np.float32)
+    return read_grey(path).astype(np.float32)
 
 
 def read_pfm(path: Path) -> FloatMap:
