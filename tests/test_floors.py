@@ -25,7 +25,7 @@ FLOORS = {
     "shop_v4": (34.21, 0.930),
     "shop_17x17": (30.50, 0.887),
 }
-"""Mean luma PSNR (dB) and SSIM of the virtual views, corners uncoded: what a throw-away experiment reached."""
+"""Mean luma PSNR (dB) and SSIM of the virtual views, corners uncoded: what an experiment reached."""
 
 SHOP_V3_QP = 32
 SHOP_V3_KBIT, SHOP_V3_DB = 560, 32.0
@@ -40,7 +40,7 @@ pytestmark = [
 
 @pytest.mark.parametrize("name", FLOORS)
 def test_synthesis_from_uncoded_corners(name: str) -> None:
-    command = [sys.executable, ROOT / "tools" / "benchmark.py", "--data", DATA, "--sets", name]
+    command = [sys.executable, str(ROOT / "tools" / "benchmark.py"), "--data", str(DATA), "--sets", name]
     done = subprocess.run(
         [*command, "--what", "quality", "--json"], capture_output=True, text=True, check=True
     )
