@@ -11,8 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap, Mask, Picture
+from mvcodec.stereo.adcensus import AdCensus
+from mvcodec.stereo.fixed_window import FixedWindow
 from mvcodec.stereo.matcher import PairMatcher
-from mvcodec.stereo.sad import Sad
 from mvcodec.stereo.sgbm import Sgbm
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -57,8 +58,15 @@ class Pair:
 
 @pytest.mark.parametrize(
     ("matcher", "name", "most_bad_percent"),
-    [(Sgbm(), "cones", 4.6), (Sgbm(), "teddy", 9.5), (Sad(), "cones", 15.0), (Sad(), "teddy", 20.0)],
-    ids=["sgbm-cones", "sgbm-teddy", "sad-cones", "sad-teddy"],
+    [
+        (Sgbm(), "cones", 4.6),
+        (Sgbm(), "teddy", 9.5),
+        (FixedWindow(), "cones", 15.0),
+        (FixedWindow(), "teddy", 20.0),
+        (AdCensus(), "cones", 3.7),
+        (AdCensus(), "teddy", 6.0),
+    ],
+    ids=["sgbm-cones", "sgbm-teddy", "sad-cones", "sad-teddy", "adcensus-cones", "adcensus-teddy"],
 )
 def test_bad_pixels_where_both_cameras_see(matcher: PairMatcher, name: str, most_bad_percent: float) -> None:
     pair = Pair(name)

@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mvcodec.errors import SettingError
+from mvcodec.stereo.adcensus import AdCensus
+from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stereo.pairwise import Pairwise
-from mvcodec.stereo.sad import Sad
 from mvcodec.stereo.sgbm import Sgbm
 
 MATCHERS: dict[str, Callable[[], Matcher]] = {
     "sgbm": lambda: Pairwise(Sgbm()),
     "sgbm-h": lambda: Pairwise(Sgbm(), vertical=False),
-    "sad": lambda: Pairwise(Sad()),
+    "sad": lambda: Pairwise(FixedWindow()),
+    "ssd": lambda: Pairwise(FixedWindow(FixedWindowSettings("ssd", window=9, subpixel=True))),
+    "ncc": lambda: Pairwise(FixedWindow(FixedWindowSettings("ncc", window=9, subpixel=True))),
+    "census": lambda: Pairwise(FixedWindow(FixedWindowSettings("census", window=9, subpixel=True))),
+    "adcensus": lambda: Pairwise(AdCensus()),
 }
 
 
