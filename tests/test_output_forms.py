@@ -37,11 +37,7 @@ def write_folder(folder: Path, facts: ArrayFacts, frames: int = 2) -> Path:
     with ArrayFolderWriter(folder, facts) as writer:
         for frame in range(frames):
             writer.push(
-                {
-                    (row, col): picture_of((row, col), frame)
-                    for row in range(facts.rows)
-                    for col in range(facts.cols)
-                },
+                {view: picture_of(view, frame) for view in views},
                 {(0, 1): np.full((16, 24), 1.5 + frame, np.float32)},
             )
     return folder
