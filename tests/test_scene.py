@@ -141,14 +141,16 @@ def test_threads_may_share_a_scene() -> None:
         np.testing.assert_array_equal(picture, room().render(Viewpoint(0, col), frame)[0])
 
 
-@pytest.mark.parametrize("size", [(97, 55), (16, 16), (90, 160), (161, 20)])
+@pytest.mark.parametrize("size", [(97, 55), (16, 16), (90, 160), (20, 80), (161, 20)])
 def test_any_size_is_filled(size: tuple[int, int]) -> None:
     scene = make_scene("room", SceneSettings((2, 2), 1, size))
     picture, disparity = scene.render(Viewpoint(1, 1), 0)
     assert disparity is not None
     assert picture.shape == (size[1], size[0], 3)
     assert disparity.shape == (size[1], size[0])
-    assert disparity.min() > 0
+    hint = scene.array.disparity_per_step_px
+    assert hint is not None
+    assert hint[0] < disparity.min() < disparity.max() < hint[1]
 
 
 def test_the_picture_is_worth_looking_at() -> None:
@@ -232,6 +234,11 @@ def test_scenes_keep_their_contract(name: str) -> None:
 def test_bad_settings(bad: dict[str, object], option: str) -> None:
     with pytest.raises(SettingError, match=option):
         SceneSettings(**bad)  # type: ignore[arg-type]
+
+
+def test_the_room_has_an_end() -> None:
+    with pytest.raises(SettingError, match="--size: found 20x81, expected at most 4 times as high as wide"):
+        make_scene("room", SceneSettings(size=(20, 81)))
 
 
 def test_unknown_scene() -> None:

@@ -24,7 +24,8 @@ from mvcodec.capture.solids import (
 WALL_M = 6.0
 FLOOR_M = 0.8
 NEAREST_M = 2.0
-"""No shape comes nearer to the cameras than this."""
+"""No object comes nearer to the cameras than this; the floor does, in tall pictures."""
+FLOOR_FROM_M = 0.3
 
 LIGHTING = Lighting(
     lamp=(-1.3, -2.7, 2.3),
@@ -76,7 +77,12 @@ class Room:
         """What never moves."""
         shapes: list[Shape] = [
             _brick_wall(14.0, 14.0),
-            floor((-7.0, 7.0), (0.3, WALL_M), FLOOR_M, Surface("gravel", (0, 0, 9, 3.7), (0.92, 0.84, 0.74))),
+            floor(
+                (-7.0, 7.0),
+                (FLOOR_FROM_M, WALL_M),
+                FLOOR_M,
+                Surface("gravel", (0, 0, 9, 3.7), (0.92, 0.84, 0.74)),
+            ),
             *box((0.0, 0.74, WALL_M - 0.02), (13.9, 0.12, 0.04), _SKIRTING),
         ]
         for name, x, width, height in zip(

@@ -12,7 +12,7 @@ import numpy as np
 from mvcodec.array import MAX_GRID_SIDE, MAX_PICTURE_SIDE, Calibration, CameraArray, Position, Viewpoint
 from mvcodec.capture.lighting import LightBaker
 from mvcodec.capture.renderer import LitScene, Optics
-from mvcodec.capture.room import LIGHTING, NEAREST_M, WALL_M, Room
+from mvcodec.capture.room import FLOOR_FROM_M, FLOOR_M, LIGHTING, NEAREST_M, WALL_M, Room
 from mvcodec.errors import SettingError
 from mvcodec.frames import FloatMap, Picture
 
@@ -22,6 +22,7 @@ ROOM_SPAN_M = 0.1875
 MAX_FRAMES = 100_000
 _ROOM_GRID, _ROOM_FRAMES, _ROOM_SIZE = (5, 5), 24, (640, 360)
 _MIN_SIDE = 16
+_TALLEST = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +91,9 @@ class RoomScene:
 
     The cameras stand in one plane, parallel, in square steps, and the rig's longer side is always
     as long, whatever the grid: about 20..60 px of disparity between its ends at a width of 640.
+
+    Raises:
+        SettingError: a picture more than 4 times as high as wide.
     """
 
     licence = "Rendered by mvcodec; photographs from scikit-image (CC0 and public domain)"
@@ -97,11 +101,17 @@ class RoomScene:
     def __init__(self, settings: SceneSettings) -> None:
         rows, cols = settings.grid or _ROOM_GRID
         width, height = settings.size or _ROOM_SIZE
+        if height > _TALLEST * width:
+            # Beyond that the pictures would show where wall and floor end.
+            raise SettingError("--size", _by((width, height)), f"at most {_TALLEST} times as high as wide")
         self.frame_count = settings.frames or _ROOM_FRAMES
         self._step_m = ROOM_SPAN_M / max(rows - 1, cols - 1, 1)
         self._optics = Optics(width, height, float(width))
         cx, cy = self._optics.centre_px
-        near, far = (width * self._step_m / depth for depth in (NEAREST_M, WALL_M))
+        # In a tall picture the floor comes nearer than any object, down to where it begins.
+        floor_m = (FLOOR_M - ROOM_SPAN_M / 2) / (height / 2 / width)
+        nearest_m = max(min(NEAREST_M, floor_m), FLOOR_FROM_M)
+        near, far = (width * self._step_m / depth for depth in (nearest_m, WALL_M))
         self.array = CameraArray(
             rows=rows,
             cols=cols,
