@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -126,7 +127,6 @@ class RoomScene:
         )
         self._room = Room.of_seed(settings.seed)
         self._standing = self._room.standing()
-        self._baker: LightBaker | None = None
         self._lit: tuple[int, LitScene] | None = None
         self._lock = threading.Lock()
 
@@ -144,11 +144,15 @@ class RoomScene:
         """The scene at a frame, lit; kept until another frame is asked for."""
         with self._lock:
             if self._lit is None or self._lit[0] != frame:
-                if self._baker is None:
-                    self._baker = LightBaker(self._standing, LIGHTING)
                 moving = self._room.moving(frame / ROOM_FPS)
-                self._lit = frame, LitScene([*self._standing, *moving], self._baker.bake(moving))
+                self._lit = frame, LitScene([*self._standing, *moving], _baker(self._room).bake(moving))
             return self._lit[1]
+
+
+@lru_cache(maxsize=4)
+def _baker(room: Room) -> LightBaker:
+    """What stands still lights itself once, however many grids and sizes look at it."""
+    return LightBaker(room.standing(), LIGHTING)
 
 
 class MotorcycleScene:
