@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.frames import DecodedSet, DisparityMap, Picture, RenderedView
-from mvcodec.layers.dils import split
+from mvcodec.layers.dils import split_levels
 
 DIFFERENCE_GAIN = 4
 SCALE_COLOURS = 17
-MAX_LEGEND_ITEMS = 12
+MAX_LEGEND_ITEMS = 9
 TINT = 0.62
 """Share of the class's colour where a picture is tinted; the rest is its luma, so that objects stay known."""
 
@@ -52,11 +52,12 @@ def disparity(decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Pictu
 def layers(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, dict[str, Any]]:
     """The view's depth layers (thesis 4.3.2), a colour each, over its luma."""
     view = views[0]
-    stack = split(DisparityMap(view.disparity_px, view.seen_by > 0))
+    # The thesis's own split joins real scenes into one or two layers, which shows nothing.
+    stack = split_levels(DisparityMap(view.disparity_px, view.seen_by > 0))
     count = len(stack.bounds_px)
     colours = np.array([OCCLUDED, *(_layer_colour(i, count) for i in range(count))], np.uint8)
-    names = ["in no layer, or filled", *(f"{low} to {high} px" for low, high in stack.bounds_px)]
-    text = f"Depth layers: {count}"
+    names = ["in no layer, or filled", *(f"{low} px" if low == high else f"{low} to {high} px" for low, high in stack.bounds_px)]
+    text = f"Depth layers: {count}" + (", the largest:" if count >= MAX_LEGEND_ITEMS else "")
     return _tinted(view.pixels, stack.labels, colours), _classes(text, stack.labels, colours, names)
 
 

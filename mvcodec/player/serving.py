@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import uvicorn
 
-from mvcodec.errors import MvCodecWarning, OutputError
+from mvcodec.errors import MvCodecWarning, SettingError
 from mvcodec.player.access import AccessRules, is_loopback
 from mvcodec.player.messages import MAX_MESSAGE_BYTES
 from mvcodec.player.server import Broadcast, make_app
@@ -36,7 +36,7 @@ def serve(
         open_browser: show the page in the default browser.
 
     Raises:
-        OutputError: the address cannot be bound.
+        SettingError: the address cannot be bound.
     """
     listener = _bind(host, port)
     with listener:
@@ -75,7 +75,8 @@ def _bind(host: str, port: int) -> socket.socket:
             listener.close()
             raise
     except OSError as error:
-        raise OutputError(f"--host {host} --port {port}", error.strerror or error) from None
+        found = f"{host}, {port} ({error.strerror or error})"
+        raise SettingError("--host, --port", found, "an address of this machine and a free port") from None
     return listener
 
 

@@ -1,25 +1,28 @@
 // The keys, in one table: it answers them and it writes the help.
 
+const ARROWS = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0] };
+
 export function keyTable(player) {
   const look = (name) => () => player.toggleLook(name);
-  const move = (rows, cols) => (event) => player.nudge(rows * (event.shiftKey ? 4 : 1), cols * (event.shiftKey ? 4 : 1));
   return [
     { keys: [" "], names: ["Space"], text: "play or pause", run: () => player.togglePlay() },
     { keys: [","], text: "one frame back", run: () => player.step(-1) },
     { keys: ["."], text: "one frame on", run: () => player.step(1) },
     { keys: ["Home"], text: "first frame", run: () => player.seek(0) },
     { keys: ["End"], text: "last frame", run: () => player.seek(Infinity) },
-    { keys: ["ArrowLeft"], names: ["←"], text: "viewpoint left (with Shift: a whole step)", run: move(0, -1) },
-    { keys: ["ArrowRight"], names: ["→"], text: "viewpoint right", run: move(0, 1) },
-    { keys: ["ArrowUp"], names: ["↑"], text: "viewpoint up", run: move(-1, 0) },
-    { keys: ["ArrowDown"], names: ["↓"], text: "viewpoint down", run: move(1, 0) },
+    {
+      keys: ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"],
+      names: ["←", "→", "↑", "↓"],
+      text: "move the viewpoint (Shift: a whole step)",
+      run: (event) => player.nudge(...ARROWS[event.key].map((steps) => steps * (event.shiftKey ? 4 : 1))),
+    },
     { keys: ["g"], text: "to the nearest place of the grid", run: () => player.snap() },
     { keys: ["o"], text: "loop", run: () => player.toggleLoop() },
     { keys: ["-", "+"], text: "slower, faster", run: (event) => player.changeSpeed(event.key === "-" ? -1 : 1) },
     { keys: ["v"], text: "plain picture", run: look("picture") },
     { keys: ["d"], text: "disparity", run: look("disparity") },
     { keys: ["l"], text: "depth layers", run: look("layers") },
-    { keys: ["p"], text: "provenance: how many cameras saw it", run: look("provenance") },
+    { keys: ["p"], text: "provenance: seen by how many cameras", run: look("provenance") },
     { keys: ["x"], text: "difference from the nearest real view", run: look("difference") },
     { keys: ["m"], text: "PSNR and SSIM against the original", run: () => player.toggleMeasure() },
     { keys: ["a"], text: "anaglyph, for red-cyan glasses", run: look("anaglyph") },
@@ -62,6 +65,8 @@ export function writeHelp(list, table) {
     }
     const meaning = document.createElement("dd");
     meaning.textContent = text;
-    list.append(term, meaning);
+    const pair = document.createElement("div");
+    pair.append(term, meaning);
+    list.append(pair);
   }
 }

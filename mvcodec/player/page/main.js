@@ -12,6 +12,7 @@ const NUDGE = 0.25; // steps of the grid
 const EYES_STEP = 0.05;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const DAMAGE_MS = 10000;
+const IDLE_MS = 3000;
 
 const LOOKS = {
   picture: "picture",
@@ -250,6 +251,7 @@ class Player {
 
   showPlayback() {
     const { playing, speed, loop } = this.playback;
+    this.stir();
     const button = $("play");
     button.setAttribute("aria-pressed", playing);
     button.setAttribute("aria-label", playing ? "Pause" : "Play");
@@ -272,7 +274,7 @@ class Player {
     this.showQuality(shown.quality);
     this.showDamage(shown);
     this.link.write({ ...shown, eyes: wanted.eyes }, STEREO.includes(shown.look));
-    document.body.dataset.look = shown.look;
+    Object.assign(document.body.dataset, { look: shown.look, frame: shown.frame, row: shown.row, col: shown.col });
   }
 
   showQuality(quality) {
@@ -296,6 +298,13 @@ class Player {
     this.warning = setTimeout(() => ($("damage").hidden = true), DAMAGE_MS);
   }
 
+  // Somebody is there: the controls show.
+  stir() {
+    document.body.classList.remove("idle");
+    clearTimeout(this.idling);
+    this.idling = setTimeout(() => document.body.classList.toggle("idle", this.playback.playing), IDLE_MS);
+  }
+
   say(text) {
     $("spoken").textContent = text;
   }
@@ -310,6 +319,10 @@ class Player {
     click("open-help", () => this.toggleHelp());
     click("fullscreen", () => this.toggleFullscreen());
     click("damage-close", () => ($("damage").hidden = true));
+    // After the mouse, the keys belong to the picture again; whoever came by Tab stays there.
+    for (const button of document.querySelectorAll("main button")) {
+      button.addEventListener("click", (event) => event.detail && $("stage").focus());
+    }
     $("speed").addEventListener("change", () => this.setSpeed(Number($("speed").value)));
     $("look").addEventListener("change", () => this.setLook($("look").value));
     $("eyes").addEventListener("input", () => this.setEyes(Number($("eyes").value)));
@@ -323,6 +336,7 @@ class Player {
     const table = keyTable(this);
     listenForKeys(table, $("help"));
     writeHelp($("keys"), table);
+    for (const sign of ["pointermove", "pointerdown", "keydown", "focusin"]) document.addEventListener(sign, () => this.stir());
     const controls = $("controls");
     new ResizeObserver(() => document.documentElement.style.setProperty("--controls", `${controls.offsetHeight}px`)).observe(controls);
   }

@@ -32,19 +32,19 @@ export class Stats {
       return values.length ? Math.round(values.reduce((sum, value) => sum + value, 0) / values.length) : "–";
     };
     const parts = [
-      `${this.fps} pictures/s`,
+      `${this.fps} fps`,
       `decode ${ms("decode_ms")}`,
       `synthesis ${ms("synthesis_ms")}`,
       `encode ${ms("encode_ms")}`,
       `transfer ${ms("transfer_ms")} ms`,
       `dropped ${this.facts.dropped}`,
     ];
-    this.element.replaceChildren(
-      ...parts.map((text) => {
-        const span = document.createElement("span");
-        span.textContent = text;
-        return span;
-      }),
-    );
+    // A span each, and blanks between them, so that lines break only there.
+    const spans = parts.map((text, i) => {
+      const span = document.createElement("span");
+      span.textContent = i ? `· ${text}` : text;
+      return [span, " "];
+    });
+    this.element.replaceChildren(...spans.flat());
   }
 }
