@@ -63,7 +63,7 @@ def test_layers_have_a_colour_each_and_shares_of_the_picture() -> None:
 
 def test_provenance_counts_cameras() -> None:
     decoded, view = rendered()
-    seen = np.resize(np.arange(5, dtype=np.uint8), view.seen_by.shape)
+    seen = np.array([[0, 1, 2, 3, 4]] * 64, np.uint8).repeat(20, axis=1)[:, : view.seen_by.shape[1]]
     _, legend = overlays.provenance(
         decoded, [RenderedView(view.viewpoint, view.pixels, view.disparity_px, seen)]
     )

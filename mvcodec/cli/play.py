@@ -46,11 +46,11 @@ def run(arguments: argparse.Namespace) -> None:
     for package in PACKAGES:
         if find_spec(package) is None:
             raise MissingExtra(package, EXTRA)
-    from mvcodec.capture import open_input  # noqa: PLC0415 - these need the extra, or much time
-    from mvcodec.player.originals import Originals  # noqa: PLC0415
-    from mvcodec.player.picture_maker import PictureMaker  # noqa: PLC0415
-    from mvcodec.player.server import Broadcast  # noqa: PLC0415
-    from mvcodec.player.serving import serve  # noqa: PLC0415
+    from mvcodec.capture import open_input
+    from mvcodec.player.originals import Originals
+    from mvcodec.player.picture_maker import PictureMaker
+    from mvcodec.player.server import Broadcast
+    from mvcodec.player.serving import serve
 
     make_synthesizer(arguments.synthesizer)  # a wrong name is told before anything is opened
     maker = PictureMaker(arguments.input, partial(make_synthesizer, arguments.synthesizer))

@@ -56,7 +56,10 @@ def layers(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture
     stack = split_levels(DisparityMap(view.disparity_px, view.seen_by > 0))
     count = len(stack.bounds_px)
     colours = np.array([OCCLUDED, *(_layer_colour(i, count) for i in range(count))], np.uint8)
-    names = ["in no layer, or filled", *(f"{low} px" if low == high else f"{low} to {high} px" for low, high in stack.bounds_px)]
+    names = [
+        "in no layer, or filled",
+        *(f"{low} px" if low == high else f"{low} to {high} px" for low, high in stack.bounds_px),
+    ]
     text = f"Depth layers: {count}" + (", the largest:" if count >= MAX_LEGEND_ITEMS else "")
     return _tinted(view.pixels, stack.labels, colours), _classes(text, stack.labels, colours, names)
 
