@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from plane_scene import Plane, PlaneScene, grid
 
 from mvcodec.array import Viewpoint
@@ -63,7 +64,9 @@ def test_layers_have_a_colour_each_and_shares_of_the_picture() -> None:
 
 def test_provenance_counts_cameras() -> None:
     decoded, view = rendered()
-    seen = np.array([[0, 1, 2, 3, 4]] * 64, np.uint8).repeat(20, axis=1)[:, : view.seen_by.shape[1]]
+    seen: NDArray[np.uint8] = np.zeros_like(view.seen_by)
+    for count in range(5):
+        seen[:, count::5] = count
     _, legend = overlays.provenance(
         decoded, [RenderedView(view.viewpoint, view.pixels, view.disparity_px, seen)]
     )
@@ -77,7 +80,9 @@ def test_difference_is_from_the_nearest_real_camera() -> None:
     assert overlays.nearest_camera(ARRAY, Viewpoint(0.4, 0.9)) == (0, 0)
     decoded, view = rendered(Viewpoint(0, 2))
     assert not overlays.difference(decoded, [view])[0].any()
-    other = RenderedView(Viewpoint(0, 2), view.pixels ^ 4, view.disparity_px, view.seen_by)
+    other = RenderedView(
+        Viewpoint(0, 2), np.bitwise_xor(view.pixels, np.uint8(4)), view.disparity_px, view.seen_by
+    )
     assert (overlays.difference(decoded, [other])[0] == 4 * overlays.DIFFERENCE_GAIN).all()
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import cv2
 from mvcodec.array import Viewpoint
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
+from mvcodec.player.draft import in_full_px, shrink
 from mvcodec.player.frame_store import Damage, FrameStore, StoredFrame
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.originals import Originals
@@ -59,6 +61,7 @@ class PictureMaker:
         self.store = FrameStore(path)
         self.originals: Originals | None = None
         self._synthesizers = SynthesizerPool(make_synthesizer, WORKERS)
+        self._drafts = _Drafts()
         self._ahead = ThreadPoolExecutor(1, "decode-ahead")
         self._decoding: Future[StoredFrame] | None = None
 
@@ -79,12 +82,14 @@ class PictureMaker:
             )
         if next_frame is not None:
             self._decode_ahead(next_frame)
-        decoded, look = stored.decoded, LOOKS[request.look]
         start = time.perf_counter()
+        decoded, look = self._drafts.of(stored.decoded, request.scale), LOOKS[request.look]
         viewpoints = look.place(decoded.array, request.viewpoint, request.eye_steps)
-        views = self._render(decoded, viewpoints)
+        views = [in_full_px(view, request.scale) for view in self._render(decoded, viewpoints)]
         rendered = time.perf_counter()
-        picture, legend = look.compose(decoded, views)
+        picture, legend = look.compose(
+            replace(decoded, disparity_range_px=stored.decoded.disparity_range_px), views
+        )
         jpeg = _jpeg(picture)
         done = time.perf_counter()
         facts = {
@@ -94,6 +99,7 @@ class PictureMaker:
             "row": request.viewpoint.row,
             "col": request.viewpoint.col,
             "look": request.look,
+            "scale": request.scale,
             "legend": legend or None,
             "decode_ms": round(stored.decode_ms, 2),
             "synthesis_ms": round(1000 * (rendered - start), 2),
@@ -133,6 +139,23 @@ class PictureMaker:
             "goes_on_s": times[damage.end] / 1e9 if goes_on else None,
             "message": damage.message,
         }
+
+
+class _Drafts:
+    """The frame sets shrunk last; synthesizers know by identity what they have prepared."""
+
+    def __init__(self) -> None:
+        self._held: deque[tuple[DecodedSet, float, DecodedSet]] = deque(maxlen=WORKERS + 1)
+
+    def of(self, decoded: DecodedSet, scale: float) -> DecodedSet:
+        if scale == 1:
+            return decoded
+        for whole, held_scale, draft in list(self._held):
+            if whole is decoded and held_scale == scale:
+                return draft
+        draft = shrink(decoded, scale)
+        self._held.append((decoded, scale, draft))
+        return draft
 
 
 def _jpeg(picture: Picture) -> bytes:

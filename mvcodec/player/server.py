@@ -198,13 +198,15 @@ class _Viewer:
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._news.wait(), wait_s)
                 continue
-            make = self._broadcast.maker.make
+            make, start_s = self._broadcast.maker.make, time.monotonic()
             try:
                 made = await loop.run_in_executor(self._pool, make, request, session.next_frame())
             except MvCodecError as error:
                 trouble = {"type": "trouble", "message": str(error), "frame": request.frame}
                 await self._socket.send_text(json.dumps(trouble))
                 continue
+            now_s = time.monotonic()
+            session.made(request, now_s - start_s, now_s)
             await self._send_picture(made)
 
     async def _send_picture(self, made: MadePicture) -> None:

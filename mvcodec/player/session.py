@@ -6,11 +6,13 @@ at most `MAX_IN_FLIGHT` pictures wait to be drawn, so that nothing can queue up.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.player.clock import PlayClock
+from mvcodec.player.draft import Pace
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.messages import (
     Eyes,
@@ -29,6 +31,9 @@ from mvcodec.player.messages import (
 
 MAX_IN_FLIGHT = 2
 
+MOVING_S = 1.0
+"""How long after its last move a viewpoint counts as moving."""
+
 
 @dataclass(frozen=True, slots=True)
 class PictureRequest:
@@ -40,6 +45,7 @@ class PictureRequest:
         look: a name of LOOKS.
         eye_steps: distance of two eyes in steps of the grid; 0 where the look is for one.
         measure: against the original.
+        scale: of the picture's sides, one of draft.SCALES.
     """
 
     frame: int
@@ -47,6 +53,7 @@ class PictureRequest:
     look: str = "picture"
     eye_steps: float = 0.0
     measure: bool = False
+    scale: float = 1.0
 
 
 class Session:
@@ -69,6 +76,8 @@ class Session:
         self._ready = False
         self._sent = 0
         self._in_flight: dict[int, float] = {}
+        self._pace = Pace()
+        self._moved_s = -math.inf
         self.transfer_ms: float | None = None
 
     @property
@@ -90,6 +99,7 @@ class Session:
                 self._ready = True
             case Move(viewpoint):
                 self._wanted = replace(self._wanted, viewpoint=self._inside(viewpoint))
+                self._moved_s = now_s
             case Seek(frame):
                 clock.seek(frame, now_s)
             case Step(frames):
@@ -116,6 +126,9 @@ class Session:
             return None
         eye_steps = self._eye_steps if LOOKS[self._wanted.look].stereo else 0.0
         request = replace(self._wanted, frame=self._clock.advance(now_s), eye_steps=eye_steps)
+        # A picture that stands, or that is measured, is never a draft.
+        if self._clock.playing and not request.measure:
+            request = replace(request, scale=self._pace.scale)
         if request == self._last:
             return None
         self._last = request
@@ -132,6 +145,12 @@ class Session:
         if not self._ready or len(self._in_flight) >= MAX_IN_FLIGHT:
             return None
         return self._clock.seconds_to_next(now_s)
+
+    def made(self, request: PictureRequest, cost_s: float, now_s: float) -> None:
+        """Note what a picture cost, which decides the scale of the next ones."""
+        if request.scale == self._pace.scale and self._clock.playing:
+            moving = now_s - self._moved_s < MOVING_S
+            self._pace.note(cost_s, 0.0 if moving else 1 / (self._array.fps * self._clock.speed))
 
     def sent(self, now_s: float, *, damaged: bool = False) -> int:
         """Note that a picture leaves now; returns its number, from 1, which the page repeats in `Shown`."""

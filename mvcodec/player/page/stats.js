@@ -38,6 +38,7 @@ export class Stats {
       `encode ${ms("encode_ms")}`,
       `transfer ${ms("transfer_ms")} ms`,
       `dropped ${this.facts.dropped}`,
+      ...(this.facts.scale < 1 ? [`at ${Math.round(100 * this.facts.scale)} % size`] : []),
     ];
     // A span each, and blanks between them, so that lines break only there.
     const spans = parts.map((text, i) => {

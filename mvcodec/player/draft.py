@@ -1,0 +1,110 @@
+"""Smaller frame sets, for playing where whole pictures take too long, and when to use them."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from mvcodec.array import CameraArray
+from mvcodec.frames import DecodedSet, DisparityMap, FloatMap, Picture, RenderedView
+
+SCALES = (1.0, 0.75, 0.5)
+"""Of the picture's sides."""
+
+BUDGET_S = 0.052
+"""For making a picture: 15 a second, with time to send and draw it."""
+
+WINDOW = 5
+"""Pictures that are averaged before the scale changes."""
+
+
+class Pace:
+    """Chooses the scale of pictures from what they cost, so that playing stays smooth."""
+
+    def __init__(self) -> None:
+        self._place = 0
+        self._costs_s: deque[float] = deque(maxlen=WINDOW)
+
+    @property
+    def scale(self) -> float:
+        """One of SCALES."""
+        return SCALES[self._place]
+
+    def note(self, cost_s: float, allowed_s: float) -> None:
+        """Learn what a picture of the present scale cost.
+
+        Args:
+            cost_s: seconds from its request to its being sent.
+            allowed_s: seconds from one frame to the next, if nothing but frames changes the picture.
+        """
+        self._costs_s.append(cost_s)
+        if len(self._costs_s) < WINDOW:
+            return
+        budget_s = max(BUDGET_S, allowed_s)
+        average_s = sum(self._costs_s) / WINDOW
+        if average_s > budget_s and self._place + 1 < len(SCALES):
+            self._go(self._place + 1)
+        elif self._place and average_s * (SCALES[self._place - 1] / self.scale) ** 2 < budget_s:
+            self._go(self._place - 1)
+
+    def _go(self, place: int) -> None:
+        self._place = place
+        self._costs_s.clear()
+
+
+def shrink(decoded: DecodedSet, scale: float) -> DecodedSet:
+    """The frame set with pictures of `scale` times the size; disparities are px of the smaller pictures."""
+    if scale == 1:
+        return decoded
+    array = _shrunk_array(decoded.array, scale)
+    size = array.width, array.height
+    low, high = decoded.disparity_range_px
+    return replace(
+        decoded,
+        array=array,
+        pictures={camera: _shrunk_picture(picture, size) for camera, picture in decoded.pictures.items()},
+        disparities={camera: _shrunk_map(item, size, scale) for camera, item in decoded.disparities.items()},
+        disparity_range_px=(low * scale, high * scale),
+    )
+
+
+def in_full_px(view: RenderedView, scale: float) -> RenderedView:
+    """A view of a shrunken frame set, its disparity in px of the whole pictures."""
+    return view if scale == 1 else replace(view, disparity_px=view.disparity_px / np.float32(scale))
+
+
+def _shrunk_array(array: CameraArray, scale: float) -> CameraArray:
+    width, height = max(1, round(array.width * scale)), max(1, round(array.height * scale))
+    given, hint = array.calibration, array.disparity_per_step_px
+    across, down = width / array.width, height / array.height
+    calibration = replace(
+        given,
+        fx_px=given.fx_px * across,
+        fy_px=given.fy_px * down,
+        cx_px=(given.cx_px + 0.5) * across - 0.5,
+        cy_px=(given.cy_px + 0.5) * down - 0.5,
+        d_inf_px_per_step=given.d_inf_px_per_step * across,
+    )
+    return replace(
+        array,
+        width=width,
+        height=height,
+        calibration=calibration,
+        disparity_per_step_px=hint and (hint[0] * scale, hint[1] * scale),
+    )
+
+
+def _shrunk_picture(picture: Picture, size: tuple[int, int]) -> Picture:
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_LINEAR), np.uint8)
+
+
+def _shrunk_map(disparity: DisparityMap, size: tuple[int, int], scale: float) -> DisparityMap:
+    # Nearest, since a mean of two surfaces lies on neither.
+    values: FloatMap = np.asarray(
+        cv2.resize(disparity.values_px, size, interpolation=cv2.INTER_NEAREST), np.float32
+    )
+    valid = cv2.resize(disparity.valid.view(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+    return DisparityMap(values * np.float32(scale), valid.astype(np.bool_))
