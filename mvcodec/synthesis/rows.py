@@ -35,7 +35,7 @@ def forward_pair(
         view's), and valid where there is a pixel, a filled one or not: the next level of MLVS works on
         filled pictures as on others, else the strips that no pair covers would stay black.
     """
-    from mvcodec.kernels import pairs  # noqa: PLC0415 - Numba takes half a second to import
+    from mvcodec.kernels import pairs
 
     source = pairs.forward_sources(shift_px, nearness, usable)
     pixels, disparity, seen_by = pairs.blend_pair(

@@ -6,10 +6,12 @@ from collections.abc import Callable
 
 from mvcodec.errors import SettingError
 from mvcodec.synthesis.dils import Dils
+from mvcodec.synthesis.layered import Layered
 from mvcodec.synthesis.linear import Linear
 from mvcodec.synthesis.synthesizer import Synthesizer
 
 SYNTHESIZERS: dict[str, Callable[[], Synthesizer]] = {
+    "layered": Layered,
     "dils": Dils,
     "linear": Linear,
 }

@@ -1,0 +1,167 @@
+"""Disparity at a virtual view: real cameras' maps moved there, put to the vote, filled.
+
+Unknown disparity is `UNKNOWN` within these kernels, which a median sorts behind everything known; it
+never leaves `mvcodec.synthesis.layered`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FloatMap = NDArray[np.float32]
+
+UNKNOWN = np.float32(-1e9)
+"""Stands for a disparity that no camera knows; below any real one."""
+
+
+@njit(cache=True, nogil=True)
+def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out: FloatMap) -> None:
+    """Move a map to a view, nearest surface last.
+
+    Args:
+        disparity: float32 (H, W), px.
+        shift_x, shift_y: px that a pixel moves (left, up) for each px of disparity.
+        reach: a pixel covers the places within this distance (px, 0.5..1); above 0.5 it closes the
+            cracks of surfaces that the move stretches.
+        out: float32 (H + 2, W + 2), C-contiguous, overwritten: the view with a border of one pixel, in
+            which whatever leaves the picture lands; UNKNOWN where nothing does.
+    """
+    height, width = disparity.shape
+    by_x, by_y, spill = np.float32(shift_x), np.float32(shift_y), np.float32(1) - np.float32(reach)
+    stride = np.int32(width + 2)
+    flat = out.ravel()
+    flat[:] = UNKNOWN
+    places = np.empty(width, np.int32)
+    beside, above = np.empty(width, np.int32), np.empty(width, np.int32)
+    for y in range(height):
+        row = disparity[y]
+        for x in range(width):  # vectorised: no branch, 32 bits throughout
+            target_x = min(max(np.float32(x) - by_x * row[x], np.float32(-1)), np.float32(width))
+            target_y = min(max(np.float32(y) - by_y * row[x], np.float32(-1)), np.float32(height))
+            u, v = np.int32(target_x + np.float32(1.5)), np.int32(target_y + np.float32(1.5))
+            part_x = target_x + np.float32(1) - np.float32(u)
+            part_y = target_y + np.float32(1) - np.float32(v)
+            places[x] = v * stride + u
+            beside[x] = np.int32(part_x >= spill) - np.int32(part_x <= -spill)
+            above[x] = (np.int32(part_y >= spill) - np.int32(part_y <= -spill)) * stride
+        for x in range(width):
+            d = row[x]
+            place = np.uint32(places[x])
+            flat[place] = max(flat[place], d)
+            if beside[x] != 0:
+                place = np.uint32(places[x] + beside[x])
+                flat[place] = max(flat[place], d)
+            if above[x] != 0:
+                place = np.uint32(places[x] + above[x])
+                flat[place] = max(flat[place], d)
+                if beside[x] != 0:
+                    place = np.uint32(places[x] + above[x] + beside[x])
+                    flat[place] = max(flat[place], d)
+
+
+@njit(cache=True, nogil=True)
+def _outvote(near, weight, known, tolerance, ratio):  # type: ignore[no-untyped-def]
+    """The winner among `known` disparities, sorted near to far; see `vote`."""
+    best, best_weight = UNKNOWN, np.float32(0)
+    start = 0
+    while start < known:
+        end = start
+        total = np.float32(0)
+        mean = np.float32(0)
+        while end < known and near[start] - near[end] <= tolerance:
+            total += weight[end]
+            mean += weight[end] * near[end]
+            end += 1
+        if start == 0 or total > ratio * best_weight:
+            best, best_weight = mean / total, total
+        start = end
+    return best
+
+
+@njit(cache=True, nogil=True)
+def vote(
+    moved: NDArray[np.float32],
+    weights: NDArray[np.float32],
+    tolerance: float,
+    ratio: float,
+    out: FloatMap,
+    first: int,
+    last: int,
+) -> None:
+    """One disparity for each pixel from the cameras' moved maps, rows first..last-1.
+
+    Disparities within `tolerance` px of the nearest one of their group are one surface. Surfaces are
+    tried near to far; a farther one wins when its cameras weigh more than `ratio` times those of the
+    winner so far, so that a wrong near disparity is outvoted.
+
+    Args:
+        moved: float32 (N, H + 2, W + 2), px, or UNKNOWN; see `splat`.
+        weights: float32 (N,), of the cameras, above 0.
+        out: float32 (H, W), rows first..last-1 overwritten; UNKNOWN where no camera knows.
+    """
+    count, width = moved.shape[0], out.shape[1]
+    near = np.empty(count, np.float32)
+    weight = np.empty(count, np.float32)
+    near_px, least = np.float32(tolerance), np.float32(ratio)
+    nearest = np.empty(width, np.float32)
+    farthest = np.empty(width, np.float32)
+    everyone = np.float32(0)
+    for i in range(count):
+        everyone += weights[i]
+    for y in range(first, last):
+        mean = out[y]
+        mean[:] = 0
+        nearest[:] = UNKNOWN
+        farthest[:] = -UNKNOWN
+        for i in range(count):
+            row, share = moved[i, y + 1, 1:-1], weights[i] / everyone
+            for x in range(width):
+                mean[x] += share * row[x]
+                nearest[x] = max(nearest[x], row[x])
+                farthest[x] = min(farthest[x], row[x])
+        for x in range(width):
+            if nearest[x] - farthest[x] <= near_px and nearest[x] > UNKNOWN:
+                continue
+            known = 0
+            for i in range(count):
+                d = moved[i, y + 1, x + 1]
+                if d > UNKNOWN:
+                    place = known
+                    while place > 0 and near[place - 1] < d:
+                        near[place] = near[place - 1]
+                        weight[place] = weight[place - 1]
+                        place -= 1
+                    near[place] = d
+                    weight[place] = weights[i]
+                    known += 1
+            mean[x] = _outvote(near, weight, known, near_px, least)
+
+
+@njit(cache=True, nogil=True)
+def fill_background(disparity: FloatMap, fallback: float, first: int, last: int) -> None:
+    """Fill unknown pixels in place with the farther end of their gap on the row, rows first..last-1.
+
+    What a view sees and no camera did lies behind the nearer surface. A row without any known pixel
+    takes `fallback`.
+    """
+    _, width = disparity.shape
+    for y in range(first, last):
+        x = 0
+        while x < width:
+            if disparity[y, x] > UNKNOWN:
+                x += 1
+                continue
+            end = x
+            while end < width and disparity[y, end] <= UNKNOWN:
+                end += 1
+            farther = np.float32(np.inf)
+            if x > 0:
+                farther = disparity[y, x - 1]
+            if end < width:
+                farther = min(farther, disparity[y, end])
+            if np.isinf(farther):
+                farther = np.float32(fallback)
+            disparity[y, x:end] = farther
+            x = end
