@@ -209,7 +209,8 @@ def settle(page: Page) -> tuple[int, float, float]:
     """What is on the screen once it has stopped changing."""
     last = None
     while last != (last := on_screen(page)):
-        page.wait_for_timeout(200)
+        page.wait_for_timeout(300)
+    shows(page, scale=1)
     return last
 
 

@@ -10,8 +10,8 @@ from plane_scene import Plane, PlaneScene, grid
 from mvcodec.array import Calibration, CameraArray, Viewpoint
 from mvcodec.evaluation.metrics import psnr
 from mvcodec.player.draft import BUDGET_S, SCALES, WINDOW, Pace, in_full_px, shrink
-from mvcodec.player.messages import Measure, Play, Ready, Seek
-from mvcodec.player.session import Session
+from mvcodec.player.messages import Measure, Message, Move, Play, Ready, Seek
+from mvcodec.player.session import MOVING_S, Session
 from mvcodec.synthesis.linear import Linear, LinearSettings
 
 SYNTHESIZER = Linear(LinearSettings(fill_holes=True))
@@ -45,15 +45,17 @@ def steady(pace: Pace, cost_s: float, allowed_s: float = 0.0) -> None:
 
 def test_the_scale_follows_the_cost_and_returns() -> None:
     pace = Pace()
-    steady(pace, 0.9 * BUDGET_S)
-    assert pace.scale == 1
-    for scale in (*SCALES[1:], SCALES[-1]):
-        steady(pace, 1.1 * BUDGET_S)
-        assert pace.scale == scale
-    steady(pace, 0.9 * BUDGET_S)  # the next larger one would cost too much
-    assert pace.scale == SCALES[-1]
-    for scale in reversed(SCALES[:-1]):
-        steady(pace, 0.2 * BUDGET_S)
+    for cost, scale in (
+        (0.9, 1),
+        (1.1, 0.75),
+        (0.9, 0.75),
+        (1.1, 0.5),
+        (9, 0.5),
+        (0.9, 0.5),
+        (0.2, 1),
+        (3, 0.5),
+    ):
+        steady(pace, cost * BUDGET_S)
         assert pace.scale == scale
 
 
@@ -63,26 +65,44 @@ def test_slow_frames_have_more_time() -> None:
     assert pace.scale == 1
 
 
-def test_only_playing_uses_drafts() -> None:
-    array = CameraArray(2, 2, 64, 48, 25.0, (0, 1), (0, 1), Calibration.nominal(64, 48))
-    session = Session(array, 1000)
-    session.apply(Ready(), 0.0)
-    session.apply(Play(True), 0.0)
-    for number in range(WINDOW + 1):
-        request = session.next_request(number / 10)
-        assert request is not None
-        assert request.scale == (1.0 if number < WINDOW else SCALES[1])
-        session.made(request, 0.2, number / 10)
+def slow_session(*messages: Message) -> Session:
+    """A session whose pictures take 200 ms, ready at 0 s."""
+    session = Session(CameraArray(2, 2, 64, 48, 25.0, (0, 1), (0, 1), Calibration.nominal(64, 48)), 1000)
+    for message in (Ready(), *messages):
+        session.apply(message, 0.0)
+    return session
+
+
+def scale_at(session: Session, now_s: float) -> float:
+    request = session.next_request(now_s)
+    assert request is not None
+    session.made(request, 0.2, now_s)
+    return request.scale
+
+
+def test_playing_uses_drafts_and_a_picture_that_stands_is_whole() -> None:
+    session = slow_session(Play(True))
+    scales = [scale_at(session, number / 10) for number in range(WINDOW + 1)]
+    assert scales == [1.0] * WINDOW + [SCALES[-1]]
     session.apply(Measure(True), 0.7)
-    request = session.next_request(0.7)
-    assert request is not None
-    assert request.scale == 1
+    assert scale_at(session, 0.7) == 1
     session.apply(Measure(False), 0.8)
-    session.apply(Play(False), 0.8)
-    request = session.next_request(0.9)
-    assert request is not None
-    assert request.scale == 1
+    assert scale_at(session, 0.8) == SCALES[-1]
+    session.apply(Play(False), 0.9)
+    assert scale_at(session, 0.9) == 1
     session.apply(Seek(3), 1.0)
-    request = session.next_request(1.0)
-    assert request is not None
-    assert request.scale == 1
+    assert scale_at(session, 1.0) == 1
+
+
+def test_dragging_uses_drafts_until_the_viewpoint_rests() -> None:
+    session = slow_session()
+    scale_at(session, 0.0)
+    for number in range(WINDOW + 1):
+        session.apply(Move(Viewpoint(0.0, number / 10)), number / 10)
+        scale = scale_at(session, number / 10)
+    assert scale == SCALES[-1]
+    now_s = WINDOW / 10
+    assert session.next_request(now_s) is None
+    assert session.seconds_to_next(now_s) == pytest.approx(MOVING_S)
+    assert scale_at(session, now_s + MOVING_S + 0.01) == 1
+    assert session.seconds_to_next(now_s + 1) is None

@@ -1,4 +1,4 @@
-"""Smaller frame sets, for playing where whole pictures take too long, and when to use them."""
+"""Smaller frame sets, for playing and dragging where whole pictures take too long, and when to use them."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ SCALES = (1.0, 0.75, 0.5)
 BUDGET_S = 0.052
 """For making a picture: 15 a second, with time to send and draw it."""
 
-WINDOW = 5
-"""Pictures that are averaged before the scale changes."""
+WINDOW = 4
+"""Pictures that are averaged before the scale may change."""
 
 
 class Pace:
-    """Chooses the scale of pictures from what they cost, so that playing stays smooth."""
+    """Chooses the scale of pictures from what they cost, so that motion stays smooth."""
 
     def __init__(self) -> None:
         self._place = 0
@@ -43,15 +43,9 @@ class Pace:
         self._costs_s.append(cost_s)
         if len(self._costs_s) < WINDOW:
             return
-        budget_s = max(BUDGET_S, allowed_s)
-        average_s = sum(self._costs_s) / WINDOW
-        if average_s > budget_s and self._place + 1 < len(SCALES):
-            self._go(self._place + 1)
-        elif self._place and average_s * (SCALES[self._place - 1] / self.scale) ** 2 < budget_s:
-            self._go(self._place - 1)
-
-    def _go(self, place: int) -> None:
-        self._place = place
+        average_s, budget_s = sum(self._costs_s) / WINDOW, max(BUDGET_S, allowed_s)
+        fitting = (i for i, scale in enumerate(SCALES) if average_s * (scale / self.scale) ** 2 <= budget_s)
+        self._place = next(fitting, len(SCALES) - 1)
         self._costs_s.clear()
 
 

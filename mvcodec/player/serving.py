@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import sys
 import threading
 import warnings
 import webbrowser
@@ -14,6 +15,10 @@ from mvcodec.errors import MvCodecWarning, SettingError
 from mvcodec.player.access import AccessRules, is_loopback
 from mvcodec.player.messages import MAX_MESSAGE_BYTES
 from mvcodec.player.server import Broadcast, make_app
+
+SWITCH_S = 0.0005
+"""A picture is made in some twenty steps that each wait for the interpreter; at Python's own 5 ms a thread
+that is busy elsewhere doubles the time that the picture takes."""
 
 GRACE_S = 2
 """How long an interrupted server waits for its viewers' connections to close."""
@@ -55,6 +60,7 @@ def serve(
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=GRACE_S,
         )
+        sys.setswitchinterval(SWITCH_S)
         on_ready(url)
         if open_browser:
             threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()

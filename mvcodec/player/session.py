@@ -31,7 +31,7 @@ from mvcodec.player.messages import (
 
 MAX_IN_FLIGHT = 2
 
-MOVING_S = 1.0
+MOVING_S = 0.2
 """How long after its last move a viewpoint counts as moving."""
 
 
@@ -127,7 +127,7 @@ class Session:
         eye_steps = self._eye_steps if LOOKS[self._wanted.look].stereo else 0.0
         request = replace(self._wanted, frame=self._clock.advance(now_s), eye_steps=eye_steps)
         # A picture that stands, or that is measured, is never a draft.
-        if self._clock.playing and not request.measure:
+        if (self._clock.playing or self._moving(now_s)) and not request.measure:
             request = replace(request, scale=self._pace.scale)
         if request == self._last:
             return None
@@ -144,12 +144,14 @@ class Session:
         """How long until `next_request` may have news without a message; None: not before one."""
         if not self._ready or len(self._in_flight) >= MAX_IN_FLIGHT:
             return None
-        return self._clock.seconds_to_next(now_s)
+        if self._clock.playing or self._last is None or self._last.scale == 1:
+            return self._clock.seconds_to_next(now_s)
+        return max(0.0, self._moved_s + MOVING_S - now_s)  # then the whole picture follows
 
     def made(self, request: PictureRequest, cost_s: float, now_s: float) -> None:
         """Note what a picture cost, which decides the scale of the next ones."""
-        if request.scale == self._pace.scale and self._clock.playing:
-            moving = now_s - self._moved_s < MOVING_S
+        moving = self._moving(now_s)
+        if request.scale == self._pace.scale and (moving or self._clock.playing):
             self._pace.note(cost_s, 0.0 if moving else 1 / (self._array.fps * self._clock.speed))
 
     def sent(self, now_s: float, *, damaged: bool = False) -> int:
@@ -164,6 +166,9 @@ class Session:
         sent_s = self._in_flight.pop(picture, None)
         if sent_s is not None:
             self.transfer_ms = 1000 * (now_s - sent_s)
+
+    def _moving(self, now_s: float) -> bool:
+        return now_s - self._moved_s < MOVING_S
 
     def _inside(self, viewpoint: Viewpoint) -> Viewpoint:
         array = self._array
