@@ -1,0 +1,261 @@
+"""The compiled loops of the default renderer against their plain twins, on random input."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import view_twins as twins
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mvcodec.frames import FloatMap, Mask
+from mvcodec.kernels import view_colour, view_depth
+from mvcodec.synthesis.layered import LayeredSettings
+
+SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11), (14, 8)]
+seeds = st.integers(0, 2**32 - 1)
+shapes = st.tuples(st.integers(1, 12), st.integers(1, 12))
+Shape = tuple[int, int]
+Planes = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]
+Run = Callable[[int, int], None]
+
+
+def test_the_kernels_share_one_value_for_the_unknown() -> None:
+    assert np.float32(twins.UNKNOWN) == view_depth.UNKNOWN
+    assert view_colour.CONTOUR < -1e6
+
+
+def some_maps(rng: np.random.Generator, count: int, shape: Shape, holes: float = 0.0) -> NDArray[np.float32]:
+    """Maps of few surfaces of either sign in multiples of 1/16 px, so that float32 has no rounding to do."""
+    surfaces = rng.integers(-96, 97, 4) / 16
+    maps = rng.choice(surfaces, (count, *shape)) + rng.integers(-4, 5, (count, *shape)) / 16
+    maps = np.where(rng.random(maps.shape) < holes, twins.UNKNOWN, maps)
+    return np.ascontiguousarray(maps, np.float32)
+
+
+def smoother(maps: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float32]:
+    """The same, in which whole blocks of pixels lie on one surface, as on a real map."""
+    block = int(rng.integers(1, 12))
+    height, width = maps.shape[1:]
+    rows, columns = np.arange(height) // block * block, np.arange(width) // block * block
+    return np.ascontiguousarray(maps[:, rows][:, :, columns])
+
+
+def in_bands(height: int, out: NDArray[np.float32] | NDArray[np.uint8], run: Run) -> None:
+    """Run a kernel band by band, and see that each leaves the rows of the others alone."""
+    cut = height // 3
+    for first, last in ((cut, height), (0, cut)):
+        others = np.ones(height, np.bool_)
+        others[first:last] = False
+        before = out[others].copy()
+        run(first, last)
+        np.testing.assert_array_equal(out[others], before)
+
+
+# --- moving a map to the view
+
+
+def moved(disparity: FloatMap, shift: tuple[float, float], reach: float) -> FloatMap:
+    out = np.full((disparity.shape[0] + 2, disparity.shape[1] + 2), np.nan, np.float32)
+    view_depth.splat(disparity, *shift, reach, out)
+    return out
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, shapes, st.integers(-16, 16), st.integers(-16, 16), st.sampled_from([0.5, 0.58, 0.75, 0.99]))
+def test_splat(seed: int, shape: Shape, right: int, down: int, reach: float) -> None:
+    disparity = some_maps(np.random.default_rng(seed), 1, shape)[0]
+    shift = right / 8, down / 8
+    np.testing.assert_array_equal(moved(disparity, shift, reach), twins.splat(disparity, *shift, reach))
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (0.25, 0.0), (0.0, -0.75), (-1.5, 0.625), (0.5, 0.5)])
+def test_splat_of_every_shape(shape: Shape, shift: tuple[float, float]) -> None:
+    for seed in range(10):
+        disparity = some_maps(np.random.default_rng(seed), 1, shape)[0]
+        np.testing.assert_array_equal(moved(disparity, shift, 0.58), twins.splat(disparity, *shift, 0.58))
+
+
+def test_splat_of_what_leaves_the_picture_far_away() -> None:
+    disparity = np.array([[2000.0, 0.0, -2000.0]], np.float32)
+    out = moved(disparity, (0.5, 0.25), 0.5)
+    np.testing.assert_array_equal(
+        out[1], np.array([twins.UNKNOWN, twins.UNKNOWN, 0, twins.UNKNOWN, twins.UNKNOWN], np.float32)
+    )
+    assert (out[0, 0], out[2, -1]) == (2000, -2000)
+
+
+def test_splat_closes_the_cracks_of_a_stretched_surface() -> None:
+    """A slope stretched by an eighth: nearest pixels alone leave cracks, a reach of .58 leaves none."""
+    slope = np.tile(np.arange(40) / 4 + 0.3, (3, 1)).astype(np.float32)
+    nearest, wider = (
+        moved(slope, (-0.5, 0.0), reach)[1:-1, 1:40] > view_depth.UNKNOWN for reach in (0.5, 0.58)
+    )
+    assert not nearest.all()
+    assert wider.all()
+
+
+# --- the vote
+
+
+def voted(
+    maps: NDArray[np.float32], weights: NDArray[np.float32], tolerance: float, ratio: float
+) -> FloatMap:
+    out = np.full((maps.shape[1] - 2, maps.shape[2] - 2), np.nan, np.float32)
+    in_bands(out.shape[0], out, lambda *band: view_depth.vote(maps, weights, tolerance, ratio, out, *band))
+    return out
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seeds,
+    shapes,
+    st.integers(1, 4),
+    st.sampled_from([0.0, 0.3, 1.0]),
+    st.tuples(st.sampled_from([0.25, 1.5, 1000.0]), st.sampled_from([1.0, 1.5, 2.0])),
+)
+def test_vote(seed: int, shape: Shape, count: int, holes: float, within: tuple[float, float]) -> None:
+    tolerance, ratio = within
+    rng = np.random.default_rng(seed)
+    maps = some_maps(rng, count, (shape[0] + 2, shape[1] + 2), holes)
+    weights = (rng.integers(1, 17, count) / 16).astype(np.float32)
+    found, expected = voted(maps, weights, tolerance, ratio), twins.vote(maps, weights, tolerance, ratio)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-4)
+    assert holes < 1 or (found == view_depth.UNKNOWN).all()
+
+
+@pytest.mark.parametrize(
+    ("disparities", "weights", "expected"),
+    [
+        ([3.0, 3.0, 3.0, 20.0], [1, 1, 1, 1], 3.0),
+        ([3.0, 3.0, 20.0, 20.0], [1, 1, 1, 1], 20.0),
+        ([3.0, 3.0, 20.0, 20.0], [2, 2, 1, 1], 3.0),
+        ([-5.0, -4.0], [1, 3], -4.25),
+        ([4.0, 3.0, 2.0], [1, 1, 1], 3.5),  # 2 is not within 1.5 px of 4, and alone
+        ([twins.UNKNOWN, -7.0, twins.UNKNOWN], [1, 0.125, 1], -7.0),
+        ([20.0, 10.0, 0.0], [1, 1.25, 1.25], 20.0),
+        ([20.0, 10.0, 0.0], [1, 1.25, 1.5], 0.0),
+        ([20.0, 10.0, 0.0], [1, 1.5, 1.75], 10.0),  # 0 is measured against 10, the winner so far
+    ],
+)
+def test_vote_of_one_pixel(disparities: list[float], weights: list[float], expected: float) -> None:
+    maps = np.full((len(disparities), 3, 3), twins.UNKNOWN, np.float32)
+    maps[:, 1, 1] = disparities
+    assert voted(maps, np.array(weights, np.float32), 1.5, 1.3)[0, 0] == pytest.approx(expected, abs=1e-6)
+
+
+# --- filling
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, shapes, st.sampled_from([0.1, 0.5, 0.9, 1.0]))
+def test_fill_background(seed: int, shape: Shape, holes: float) -> None:
+    disparity = some_maps(np.random.default_rng(seed), 1, shape, holes)[0]
+    filled = disparity.copy()
+    in_bands(shape[0], filled, lambda *band: view_depth.fill_background(filled, -9.0, *band))
+    np.testing.assert_array_equal(filled, twins.fill_background(disparity, -9.0))
+    assert (filled > -100).all()
+
+
+# --- colour
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_split_luma(shape: Shape) -> None:
+    border = view_colour.BORDER
+    picture = np.random.default_rng(3).integers(0, 256, (*shape, 3), dtype=np.uint8)
+    size = shape[0] + 2 * border, shape[1] + 2 * border
+    luma, colour = np.full(size, np.nan, np.float32), np.full((*size, 2), np.nan, np.float32)
+    view_colour.split_luma(picture, luma, colour)
+    for found, expected in zip((luma, colour), twins.split_luma(picture, border), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-3)
+
+
+def planes_of(sources: list[twins.Source], tolerance: float) -> Planes:
+    """The arrays that `blend` takes."""
+    border = view_colour.BORDER
+    split = [twins.split_luma(source.picture, border) for source in sources]
+    fetchable = [
+        np.where(twins.spread(source.disparity, 1, 2) > 2 * tolerance, view_colour.CONTOUR, source.disparity)
+        for source in sources
+    ]
+    return (
+        np.array([luma for luma, _ in split], np.float32),
+        np.array([colour for _, colour in split], np.float32),
+        np.array([source.disparity for source in sources], np.float32),
+        np.array([np.pad(plane, border, mode="edge") for plane in fetchable], np.float32),
+    )
+
+
+def check_blend(rng: np.random.Generator, shape: Shape, count: int, chosen: LayeredSettings) -> Mask:
+    """Compare on random input; returns which pixels some camera sees."""
+    maps = smoother(some_maps(rng, count + 1, shape), rng)
+    sources = [
+        twins.Source(
+            rng.integers(0, 256, (*shape, 3), dtype=np.uint8),
+            disparity,
+            (float(rng.integers(-8, 9) / 8), float(rng.integers(-8, 9) / 8)),
+            float(rng.integers(1, 17) / 16),
+        )
+        for disparity in maps[1:]
+    ]
+    view, tolerance = maps[0], chosen.tolerance_px
+    pixels = np.full((*shape, 3), 77, np.uint8)
+    seen_by = np.full(shape, 99, np.uint8)
+    # The cameras of a view are some of all: here every other one, from the last to the first.
+    crowd = [sources[i // 2] for i in range(2 * count)][::-1]
+    arguments = (
+        np.arange(0, 2 * count, 2),
+        planes_of(crowd, tolerance),
+        np.array([source.shift for source in sources[::-1]], np.float32),
+        np.array([source.weight for source in sources[::-1]], np.float32),
+        view,
+        (twins.spread(view, 1, 1) > tolerance).view(np.uint8),
+        tolerance,
+        chosen.edge_trust,
+        chosen.sharpness,
+        pixels,
+        seen_by,
+    )
+    in_bands(shape[0], pixels, lambda *band: view_colour.blend(*arguments, *band))
+    expected, expected_seen = twins.blend(sources, view, chosen)
+    np.testing.assert_array_equal(seen_by, expected_seen)
+    assert np.abs(pixels - expected).max() <= 0.51
+    return np.asarray(seen_by > 0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seeds,
+    st.tuples(st.integers(1, 20), st.integers(1, 20)),
+    st.integers(1, 4),
+    st.sampled_from([0.5, 1.5]),
+    st.tuples(st.sampled_from([0.25, 1.0]), st.sampled_from([-1.0, -0.65, 0.0])),
+)
+def test_blend(seed: int, shape: Shape, count: int, tolerance: float, fetch: tuple[float, float]) -> None:
+    chosen = LayeredSettings(tolerance_px=tolerance, edge_trust=fetch[0], sharpness=fetch[1])
+    check_blend(np.random.default_rng(seed), shape, count, chosen)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_blend_of_every_shape(shape: Shape) -> None:
+    seen = [check_blend(np.random.default_rng(seed), shape, 4, LayeredSettings()) for seed in range(8)]
+    assert 0 < np.mean(seen) < 1 or shape == (1, 1)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, shapes, st.sampled_from([0.05, 0.5, 0.9, 1.0]), st.integers(1, 9))
+def test_paint_holes(seed: int, shape: Shape, holes: float, reach: int) -> None:
+    rng = np.random.default_rng(seed)
+    disparity = some_maps(rng, 1, shape)[0]
+    picture = rng.integers(0, 256, (*shape, 3), dtype=np.uint8)
+    seen_by = (rng.random(shape) >= holes).astype(np.uint8)
+    picture[seen_by == 0] = 0
+    expected = twins.paint_holes(picture, disparity, seen_by, 1.5, reach)
+    view_colour.paint_holes(picture, disparity, seen_by, 1.5, reach)
+    assert np.abs(picture.astype(int) - expected).max() <= 1
+    np.testing.assert_array_equal(picture[seen_by > 0], expected[seen_by > 0])

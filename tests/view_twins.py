@@ -1,0 +1,247 @@
+"""Plain twins of the view kernels and of the whole default renderer, written down from their docstrings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvcodec.array import Viewpoint
+from mvcodec.frames import DecodedSet, FloatMap, Mask, Picture
+from mvcodec.synthesis.layered import LayeredSettings
+
+UNKNOWN = -1e9
+LUMA = np.array([0.299, 0.587, 0.114])
+
+
+def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float) -> FloatMap:
+    """float32 (H + 2, W + 2); place (0, 0) is pixel (-1, -1). For a reach below 1."""
+    height, width = disparity.shape
+    out = np.full((height + 2, width + 2), UNKNOWN, np.float32)
+    columns, rows = np.arange(-1, width + 1), np.arange(-1, height + 1)[:, None]
+    for y, x in np.ndindex(height, width):
+        d = disparity[y, x]
+        across = np.abs(columns - np.clip(x - shift_x * d, -1, width)) <= reach
+        down = np.abs(rows - np.clip(y - shift_y * d, -1, height)) <= reach
+        covered = across & down
+        out[covered] = np.maximum(out[covered], d)
+    return out
+
+
+def outvote(seen: Sequence[tuple[float, float]], tolerance: float, ratio: float) -> float:
+    """The winner among (disparity, weight), UNKNOWN among none."""
+    surfaces: list[list[tuple[float, float]]] = []
+    for d, weight in sorted(seen, reverse=True):
+        if surfaces and surfaces[-1][0][0] - d <= tolerance:
+            surfaces[-1].append((d, weight))
+        else:
+            surfaces.append([(d, weight)])
+    best, best_weight = UNKNOWN, 0.0
+    for surface in surfaces:
+        total = sum(weight for _, weight in surface)
+        if surface is surfaces[0] or total > ratio * best_weight:
+            best, best_weight = sum(d * weight for d, weight in surface) / total, total
+    return best
+
+
+def vote(
+    moved: NDArray[np.float32], weights: NDArray[np.float32], tolerance: float, ratio: float
+) -> FloatMap:
+    inner = moved[:, 1:-1, 1:-1]
+    out = np.empty(inner.shape[1:], np.float32)
+    for y, x in np.ndindex(*out.shape):
+        seen = [
+            (float(d), float(w))
+            for d, w in zip(inner[:, y, x], weights, strict=True)
+            if d > np.float32(UNKNOWN)
+        ]
+        out[y, x] = outvote(seen, tolerance, ratio)
+    return out
+
+
+def fill_background(disparity: FloatMap, fallback: float) -> FloatMap:
+    out = disparity.copy()
+    for y, row in enumerate(disparity):
+        known = np.flatnonzero(row > np.float32(UNKNOWN))
+        for x in np.flatnonzero(row <= np.float32(UNKNOWN)):
+            ends = [*known[known < x][-1:], *known[known > x][:1]]
+            out[y, x] = min((row[end] for end in ends), default=fallback)
+    return out
+
+
+def spread(disparity: FloatMap, before: int, after: int) -> FloatMap:
+    """Largest minus smallest disparity from `before` px left of and above each pixel to `after` px beyond."""
+    padded = np.pad(disparity, (before, after), mode="edge")
+    size = before + after + 1
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (size, size))
+    return np.asarray(windows.max((2, 3)) - windows.min((2, 3)), np.float32)
+
+
+def split_luma(picture: Picture, border: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Y (H + 2 border, W + 2 border), and (R - Y, B - Y) of that size."""
+    padded = np.pad(picture, ((border, border), (border, border), (0, 0)), mode="edge").astype(float)
+    luma = padded @ LUMA
+    return luma, padded[..., [0, 2]] - luma[..., None]
+
+
+def keys(distance: float, a: float) -> float:
+    """Cubic convolution's kernel (Keys 1981, equation 4 with free a)."""
+    s = abs(distance)
+    if s < 1:
+        return (a + 2) * s**3 - (a + 3) * s**2 + 1
+    return a * s**3 - 5 * a * s**2 + 8 * a * s - 4 * a if s < 2 else 0.0
+
+
+@dataclass(frozen=True)
+class Source:
+    """A camera: its picture, its map, and `shift`, px (x, y) from the view to it for each px of disparity."""
+
+    picture: Picture
+    disparity: FloatMap
+    shift: tuple[float, float]
+    weight: float
+
+    def sees(
+        self, x: int, y: int, d: float, settings: LayeredSettings
+    ) -> tuple[float, NDArray[np.float64]] | None:
+        """Its weight, and (Y, R - Y, B - Y) of the view's point (x, y) at disparity d; None if unseen."""
+        height, width = self.disparity.shape
+        at_x, at_y = x + self.shift[0] * d, y + self.shift[1] * d
+        if not (-0.5 < at_x < width - 0.5 and -0.5 < at_y < height - 0.5):
+            return None
+        at_x, at_y = np.clip(at_x, 0, width - 1), np.clip(at_y, 0, height - 1)
+        left, top = int(at_x), int(at_y)
+        columns, rows = (
+            np.arange(left - 1, left + 3).clip(0, width - 1),
+            np.arange(top - 1, top + 3).clip(0, height - 1),
+        )
+        window = self.picture[np.ix_(rows, columns)].astype(float)
+        depths = self.disparity[np.ix_(rows, columns)]
+        linear = np.outer(
+            [max(0.0, 1 - abs(at_y - top - j)) for j in (-1, 0, 1, 2)],
+            [max(0.0, 1 - abs(at_x - left - i)) for i in (-1, 0, 1, 2)],
+        )
+        if depths.max() - depths.min() > 2 * settings.tolerance_px:
+            return self._at_contour(window, linear * (np.abs(depths - d) <= settings.tolerance_px), settings)
+        if abs(self.disparity[top, left] - d) > settings.tolerance_px:
+            return None
+        cubic = np.outer(
+            [keys(at_y - top - j, settings.sharpness) for j in (-1, 0, 1, 2)],
+            [keys(at_x - left - i, settings.sharpness) for i in (-1, 0, 1, 2)],
+        )
+        return self.weight, _luma_and_differences(window, cubic, linear)
+
+    def _at_contour(
+        self, window: NDArray[np.float64], parts: NDArray[np.float64], settings: LayeredSettings
+    ) -> tuple[float, NDArray[np.float64]] | None:
+        share = float(parts.sum())
+        if share <= 1e-3:
+            return None
+        parts = parts / share
+        return share * self.weight * settings.edge_trust, _luma_and_differences(window, parts, parts)
+
+
+def _luma_and_differences(
+    window: NDArray[np.float64], for_luma: NDArray[np.float64], for_colour: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    luma = window @ LUMA
+    return np.array(
+        [
+            (luma * for_luma).sum(),
+            ((window[..., 0] - luma) * for_colour).sum(),
+            ((window[..., 2] - luma) * for_colour).sum(),
+        ]
+    )
+
+
+def surfaces_around(view_disparity: FloatMap, x: int, y: int, tolerance: float) -> list[tuple[float, float]]:
+    """(disparity, weight) of each surface of the 3 x 3 window, that of the pixel itself first."""
+    height, width = view_disparity.shape
+    found = [(float(view_disparity[y, x]), 1.0)]
+    for v in range(max(y - 1, 0), min(y + 2, height)):
+        for u in range(max(x - 1, 0), min(x + 2, width)):
+            if (u, v) == (x, y):
+                continue
+            d, weight = float(view_disparity[v, u]), 1 / (1 + (u - x) ** 2 + (v - y) ** 2)
+            for k, (surface, so_far) in enumerate(found):
+                if abs(surface - d) <= tolerance:
+                    found[k] = surface, so_far + weight
+                    break
+            else:
+                found.append((d, weight))
+    return found
+
+
+def blend(
+    sources: Sequence[Source], view_disparity: FloatMap, settings: LayeredSettings
+) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    """RGB in 0..255, not yet rounded, and the number of cameras (0 where black: none sees the pixel)."""
+    height, width = view_disparity.shape
+    out, seen_by = np.zeros((height, width, 3)), np.zeros((height, width), np.uint8)
+    for y, x in np.ndindex(height, width):
+        mixed, total = np.zeros(3), 0.0
+        for k, (d, part) in enumerate(surfaces_around(view_disparity, x, y, settings.tolerance_px)):
+            seen = [fetch for source in sources if (fetch := source.sees(x, y, d, settings)) is not None]
+            if seen:
+                fetched = sum((weight * colour for weight, colour in seen), np.zeros(3))
+                mixed += part * fetched / sum(weight for weight, _ in seen)
+                total += part
+                seen_by[y, x] = len(seen) if k == 0 else max(int(seen_by[y, x]), 1)
+        if total > 0:
+            grey, red, blue = mixed / total
+            green = grey - (LUMA[0] * red + LUMA[2] * blue) / LUMA[1]
+            out[y, x] = np.clip((grey + red, green, grey + blue), 0, 255)
+    return out, seen_by
+
+
+def paint_holes(
+    picture: Picture, disparity: FloatMap, seen_by: NDArray[np.uint8], tolerance: float, reach: int
+) -> Picture:
+    out = picture.copy()
+    inside = np.pad(np.ones(seen_by.shape, np.bool_), reach)
+    for y, x in np.argwhere(seen_by == 0):
+        found: list[tuple[float, float, NDArray[np.uint8]]] = []
+        for step in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
+            for distance in range(1, reach + 1):
+                v, u = y + distance * step[0], x + distance * step[1]
+                if not inside[v + reach, u + reach]:
+                    break
+                if seen_by[v, u]:
+                    found.append((float(disparity[v, u]), 1 / ((v - y) ** 2 + (u - x) ** 2), picture[v, u]))
+                    break
+        background = [f for f in found if f[0] <= min(d for d, _, _ in found) + tolerance]
+        if background:
+            mean = sum((weight * colour for _, weight, colour in background), np.zeros(3))
+            out[y, x] = np.floor(mean / sum(weight for _, weight, _ in background) + 0.5)
+    return out
+
+
+def median3(disparity: FloatMap) -> FloatMap:
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(disparity, 1, mode="edge"), (3, 3))
+    return np.asarray(np.median(windows, axis=(2, 3)), np.float32)
+
+
+def render(
+    decoded: DecodedSet, viewpoint: Viewpoint, settings: LayeredSettings
+) -> tuple[NDArray[np.float64], FloatMap, NDArray[np.uint8], Mask]:
+    """A whole view between cameras: RGB not yet rounded, disparity, seen_by, and which pixels are painted."""
+    array = decoded.array
+    sources = []
+    for camera in array.cell_at(viewpoint).cameras:
+        across = 1 - abs(viewpoint.col - camera[1]) / array.col_step if array.col_step else 1
+        down = 1 - abs(viewpoint.row - camera[0]) / array.row_step if array.row_step else 1
+        if across > 0 and down > 0:
+            weight = (across * down) ** settings.weight_power
+            shift = array.shift_per_disparity(camera, viewpoint)
+            disparity = decoded.disparities[camera].values_px
+            sources.append(Source(decoded.pictures[camera], disparity, shift, weight))
+    moved = np.stack([splat(source.disparity, *source.shift, settings.reach_px) for source in sources])
+    weights = np.array([source.weight for source in sources], np.float32)
+    voted = median3(vote(moved, weights, settings.tolerance_px, settings.ratio))
+    disparity = fill_background(voted, decoded.disparity_range_px[0])
+    colours, seen_by = blend(sources, disparity, settings)
+    rounded = np.floor(colours + 0.5).astype(np.uint8)
+    painted = paint_holes(rounded, disparity, seen_by, settings.tolerance_px, settings.hole_reach_px)
+    return np.where((seen_by == 0)[..., None], painted, colours), disparity, seen_by, seen_by == 0
