@@ -296,10 +296,10 @@ def test_a_link_shows_the_same_picture(page: Page, browser: Browser, server: Run
 def test_damage_is_told_and_playback_goes_on(page: Page, file: Path, tmp_path: Path) -> None:
     with playing(damage(file, tmp_path / "damaged.mcap", gop=1)) as running:
         show(page, running, f"#frame={GOP}")
-        page.wait_for_selector("#damage:has-text('cannot be decoded')")
-        assert "until" in page.inner_text("#damage")
+        page.wait_for_selector("#notice:has-text('cannot be decoded')")
+        assert "until" in page.inner_text("#notice")
         screenshot(page, "damage")
-        page.click("#damage-close")
+        page.click("#notice-close")
         page.keyboard.press(" ")
         shows(page, frame=FRAMES - 1)
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
 import http.client
 import random
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,9 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from mvcodec.array import Viewpoint
 from mvcodec.capture import open_input
+from mvcodec.cli import play
 from mvcodec.decoder import Decoder
+from mvcodec.errors import MissingExtra
 from mvcodec.evaluation.metrics import psnr, ssim
 from mvcodec.player.access import AccessRules, is_loopback
 from mvcodec.player.messages import MAX_MESSAGE_BYTES
@@ -205,6 +209,8 @@ def test_damage_is_told_and_playback_goes_on_or_stops(file: Path, tmp_path: Path
         viewer.say("play", playing=True)
         told = viewer.next_picture().facts
         assert told["damage"]["first"] == GOP
+        assert "damaged.mcap" in told["damage"]["message"]
+        assert str(tmp_path) not in told["damage"]["message"]
         assert told["damage"]["goes_on_s"] > told["damage"]["time_s"]
         if policy == "skip":
             assert viewer.picture_of(damage=None).facts["frame"] >= 2 * GOP
@@ -262,6 +268,14 @@ def test_beyond_loopback_it_warns(file: Path, capfd: pytest.CaptureFixture[str])
         assert get(running, "/").status == 200
         assert get(running, "/", "evil.example").status == 403
     assert "over the network" in capfd.readouterr().err
+
+
+def test_without_the_extra_it_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch, file: Path) -> None:
+    monkeypatch.setattr(play, "find_spec", lambda name: None if name == "uvicorn" else find_spec(name))
+    parser = argparse.ArgumentParser()
+    play.add_arguments(parser)
+    with pytest.raises(MissingExtra, match=r"uvicorn is not installed.*pip install 'mvcodec\[play\]'"):
+        play.run(parser.parse_args([str(file)]))
 
 
 def test_stops_when_told_to(file: Path) -> None:

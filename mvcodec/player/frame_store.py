@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mvcodec.container import McapReader
@@ -64,7 +64,8 @@ class FrameStore:
 
     def __init__(self, path: Path, cache_bytes: int = CACHE_BYTES) -> None:
         self.path = path
-        self.table: FrameTable = read_frame_table(path)
+        table = read_frame_table(path)
+        self.table: FrameTable = replace(table, cut_off=table.cut_off and self._told(table.cut_off))
         self._cache = _Cache(cache_bytes)
         self._cursors: list[_Cursor] = []
         self._damage: dict[int, Damage] = {}
@@ -133,8 +134,12 @@ class FrameStore:
 
     def _note_damage(self, frame: int, error: StreamError) -> None:
         table = self.table
-        damage = Damage(frame, table.keyframe_after(frame), str(error))
+        damage = Damage(frame, table.keyframe_after(frame), self._told(str(error)))
         self._damage[table.keyframe_before(frame)] = damage
+
+    def _told(self, message: str) -> str:
+        """A message for viewers, whose business the server's folders are not."""
+        return message.replace(str(self.path), self.path.name)
 
     def _stand_in(self, damage: Damage) -> DecodedSet | None:
         """The last good frame before damage, else the first good one behind it."""

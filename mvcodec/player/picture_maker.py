@@ -77,9 +77,8 @@ class PictureMaker:
         """
         stored = self.store.fetch(request.frame)
         if stored.decoded is None:
-            raise StreamError(
-                self.store.path, stored.damage.message if stored.damage else "no frame", "a frame"
-            )
+            found = stored.damage.message if stored.damage else "no frame"
+            raise StreamError(self.store.path.name, found, "a frame that can be decoded")
         if next_frame is not None:
             self._decode_ahead(next_frame)
         start = time.perf_counter()

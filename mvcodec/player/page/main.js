@@ -11,7 +11,7 @@ import { Stats } from "./stats.js";
 const NUDGE = 0.25; // steps of the grid
 const EYES_STEP = 0.05;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
-const DAMAGE_MS = 10000;
+const NOTICE_MS = 10000;
 const IDLE_MS = 3000;
 
 const LOOKS = {
@@ -288,14 +288,14 @@ class Player {
   showDamage({ damage, frame }) {
     if (!damage) return;
     const on = damage.goes_on_s === null ? "to the end" : `until ${damage.goes_on_s.toFixed(3)} s`;
-    this.warn(`frame ${frame} cannot be decoded (from ${damage.time_s.toFixed(3)} s ${on}); the nearest whole one is shown. ${damage.message}`);
+    this.warn(`Damage: frame ${frame} cannot be decoded (from ${damage.time_s.toFixed(3)} s ${on}); the nearest whole one is shown. ${damage.message}`);
   }
 
   warn(text) {
-    if ($("damage-text").textContent !== text) $("damage-text").textContent = text;
-    $("damage").hidden = false;
+    if ($("notice-text").textContent !== text) $("notice-text").textContent = text;
+    $("notice").hidden = false;
     clearTimeout(this.warning);
-    this.warning = setTimeout(() => ($("damage").hidden = true), DAMAGE_MS);
+    this.warning = setTimeout(() => ($("notice").hidden = true), NOTICE_MS);
   }
 
   // Somebody is there: the controls show.
@@ -318,7 +318,7 @@ class Player {
     click("measure", () => this.toggleMeasure());
     click("open-help", () => this.toggleHelp());
     click("fullscreen", () => this.toggleFullscreen());
-    click("damage-close", () => ($("damage").hidden = true));
+    click("notice-close", () => ($("notice").hidden = true));
     // After the mouse, the keys belong to the picture again; whoever came by Tab stays there.
     for (const button of document.querySelectorAll("main button")) {
       button.addEventListener("click", (event) => event.detail && $("stage").focus());

@@ -33,19 +33,14 @@ export class Stats {
     };
     const parts = [
       `${this.fps} fps`,
-      `decode ${ms("decode_ms")}`,
-      `synthesis ${ms("synthesis_ms")}`,
-      `encode ${ms("encode_ms")}`,
+      `decode ${ms("decode_ms")} ms`,
+      `synthesis ${ms("synthesis_ms")} ms`,
+      `encode ${ms("encode_ms")} ms`,
       `transfer ${ms("transfer_ms")} ms`,
       `dropped ${this.facts.dropped}`,
-      ...(this.facts.scale < 1 ? [`at ${Math.round(100 * this.facts.scale)} % size`] : []),
     ];
-    // A span each, and blanks between them, so that lines break only there.
-    const spans = parts.map((text, i) => {
-      const span = document.createElement("span");
-      span.textContent = i ? `· ${text}` : text;
-      return [span, " "];
-    });
-    this.element.replaceChildren(...spans.flat());
+    if (this.facts.scale < 1) parts.push(`at ${Math.round(100 * this.facts.scale)} % size`);
+    const spans = parts.map((text) => Object.assign(document.createElement("span"), { textContent: text }));
+    this.element.replaceChildren(...spans);
   }
 }
