@@ -78,6 +78,21 @@ def ssim(original: Picture, picture: Picture) -> float:
     Raises:
         SettingError: the pictures differ in size, or are smaller than the window.
     """
+    return float(ssim_map(original, picture).mean())
+
+
+def ssim_map(original: Picture, picture: Picture) -> NDArray[np.float64]:
+    """SSIM of each pixel whose whole window lies in the picture; `ssim` is its mean.
+
+    Args:
+        original, picture: uint8 (H, W, 3) RGB or uint8 (H, W) luma.
+
+    Returns:
+        float64 (H - 10, W - 10), -1..1.
+
+    Raises:
+        SettingError: the pictures differ in size, or are smaller than the window.
+    """
     first, second = _pair(original, picture)
     height, width = first.shape
     if min(height, width) < SSIM_WINDOW:
@@ -91,7 +106,24 @@ def ssim(original: Picture, picture: Picture) -> float:
     similarity = (2 * product + SSIM_C1) * (2 * (cross - product) + SSIM_C2)
     similarity /= (energy + SSIM_C1) * (squares - energy + SSIM_C2)
     margin = SSIM_WINDOW // 2
-    return float(similarity[margin : height - margin, margin : width - margin].mean())
+    return np.asarray(similarity[margin : height - margin, margin : width - margin])
+
+
+def ssim_picture(original: Picture, picture: Picture) -> Picture:
+    """`ssim_map` to look at, as in the thesis's figures: white = alike, black = 0 or below.
+
+    Args:
+        original, picture: uint8 (H, W, 3) RGB or uint8 (H, W) luma.
+
+    Returns:
+        uint8 (H, W, 3), grey; the border that has no window of its own repeats the map's.
+
+    Raises:
+        SettingError: as `ssim_map`.
+    """
+    levels = np.rint(ssim_map(original, picture).clip(0, 1) * PEAK).astype(np.uint8)
+    grey = np.pad(levels, SSIM_WINDOW // 2, mode="edge")
+    return np.repeat(grey[..., None], 3, axis=2)
 
 
 def bad_pixel_rate(
