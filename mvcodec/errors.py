@@ -45,6 +45,10 @@ class StreamError(InputError):
     """A coded stream (container, header or packet) is damaged or not ours."""
 
 
+class MissingReference(StreamError):
+    """A coded picture builds on one that never came; the track's next keyframe heals that."""
+
+
 class OutputError(MvCodecError):
     """Something could not be written.
 

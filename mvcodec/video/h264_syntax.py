@@ -1,0 +1,331 @@
+"""What H.264 access units say about themselves: parameter sets and slice headers (ITU-T H.264, 7.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mvcodec.errors import MissingReference, StreamError
+from mvcodec.video.annexb import IDR_SLICE, PPS, SLICE, SPS, nal_type, nal_units
+from mvcodec.video.bits import BitReader, NalError, payload
+
+_HIGH_PROFILES = frozenset({100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135})
+"""The profile_idc whose parameter sets have fields of chroma and bit depth (7.3.2.1.1)."""
+
+_EXTENDED_SAR = 255
+_HEAD_BYTES = 64
+"""More than enough of a slice for the first fields of its header."""
+
+P_SLICE, B_SLICE, I_SLICE = 0, 1, 2
+"""slice_type modulo 5 (table 7-6)."""
+
+MAX_PARAMETER_SET_BYTES = 4096
+"""A parameter set has some tens of bytes; a longer one is damage."""
+
+MAX_CYCLE = 255
+"""num_ref_frames_in_pic_order_cnt_cycle, at most (7.4.2.1.1)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Colour:
+    """What the VUI says of colour; None where it says nothing.
+
+    Attributes:
+        full_range: video_full_range_flag.
+        primaries, transfer, matrix: as in ITU-T H.273; 1 is BT.709.
+    """
+
+    full_range: bool
+    primaries: int | None
+    transfer: int | None
+    matrix: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceParameters:
+    """A sequence parameter set, as far as mvcodec cares.
+
+    Attributes:
+        number: seq_parameter_set_id.
+        profile: profile_idc.
+        chroma_format: chroma_format_idc; 1 is 4:2:0.
+        bit_depth: of luma.
+        frame_num_bits: bits of frame_num in slice headers.
+        progressive: frame_mbs_only_flag.
+        width, height: px after cropping.
+        reorder: pictures that may wait for reordering; None where the stream does not say.
+        order_type: pic_order_cnt_type; 2 has no reordering.
+        colour: None without VUI.
+    """
+
+    number: int
+    profile: int
+    chroma_format: int
+    bit_depth: int
+    frame_num_bits: int
+    progressive: bool
+    width: int
+    height: int
+    reorder: int | None
+    order_type: int
+    colour: Colour | None
+
+
+@dataclass(frozen=True, slots=True)
+class SliceHeader:
+    """The first fields of a slice.
+
+    Attributes:
+        first_block: first_mb_in_slice; 0 begins a picture.
+        kind: P_SLICE, B_SLICE, I_SLICE, or 3 and 4 for SP and SI.
+        picture_set: pic_parameter_set_id.
+        idr: in an IDR picture.
+        reference: other pictures may refer to it.
+        frame_num: see 7.4.3; None where the parameter sets are not known.
+    """
+
+    first_block: int
+    kind: int
+    picture_set: int
+    idr: bool
+    reference: bool
+    frame_num: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class AccessUnit:
+    """What one access unit holds.
+
+    Attributes:
+        sequence_sets: in order.
+        picture_sets: (pic_parameter_set_id, seq_parameter_set_id), in order.
+        slices: in order.
+        kinds: nal_unit_type of every NAL unit.
+    """
+
+    sequence_sets: tuple[SequenceParameters, ...]
+    picture_sets: tuple[tuple[int, int], ...]
+    slices: tuple[SliceHeader, ...]
+    kinds: tuple[int, ...]
+
+    @property
+    def idr(self) -> bool:
+        """Whether it is an IDR picture."""
+        return any(piece.idr for piece in self.slices)
+
+    @property
+    def pictures(self) -> int:
+        """How many pictures begin in it."""
+        return sum(piece.first_block == 0 for piece in self.slices)
+
+
+class H264Parser:
+    """Parses the access units of one track in order; remembers its parameter sets."""
+
+    def __init__(self) -> None:
+        self._sequences: dict[int, SequenceParameters] = {}
+        self._pictures: dict[int, int] = {}
+
+    def push(self, data: bytes) -> AccessUnit:
+        """Parse an access unit in Annex B form.
+
+        Raises:
+            NalError: a NAL unit that breaks off or holds what the standard does not allow.
+        """
+        units = nal_units(data)
+        sequences, pictures, slices = [], [], []
+        for unit in units:
+            kind = nal_type(unit)
+            if unit[0] & 0x80:
+                raise NalError("a NAL unit with its forbidden bit set")
+            if kind == SPS:
+                sequences.append(parse_sequence(unit))
+                self._sequences[sequences[-1].number] = sequences[-1]
+            elif kind == PPS:
+                pictures.append(_picture_set(unit))
+                self._pictures[pictures[-1][0]] = pictures[-1][1]
+            elif kind in (SLICE, IDR_SLICE):
+                slices.append(self._slice(unit, kind))
+        return AccessUnit(tuple(sequences), tuple(pictures), tuple(slices), tuple(map(nal_type, units)))
+
+    def _slice(self, unit: bytes, kind: int) -> SliceHeader:
+        bits = BitReader(payload(unit, limit=_HEAD_BYTES))
+        first, slice_type, number = bits.ue(), bits.ue() % 5, bits.ue()
+        sequence = self._sequences.get(self._pictures.get(number, -1))
+        frame_num = None if sequence is None else bits.u(sequence.frame_num_bits)
+        return SliceHeader(first, slice_type, number, kind == IDR_SLICE, bool(unit[0] & 0x60), frame_num)
+
+    def frame_num_range(self, piece: SliceHeader) -> int | None:
+        """MaxFrameNum for a slice: its frame_num counts modulo this; None where it is not known."""
+        sequence = self._sequences.get(self._pictures.get(piece.picture_set, -1))
+        return None if sequence is None else 1 << sequence.frame_num_bits
+
+
+class ReferenceChain:
+    """Looks at a track's access units before a decoder does, which conceals missing pictures.
+
+    Args:
+        size: (width, height) that the track must have; the decoder would take memory for any.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self._size = size
+        self._parser = H264Parser()
+        self._next: int | None = None
+
+    def push(self, data: bytes, label: str) -> None:
+        """Follow one access unit.
+
+        Raises:
+            MissingReference: what it builds on was not pushed (7.4.3).
+            StreamError: it cannot be parsed, or is of another size.
+        """
+        try:
+            unit = self._parser.push(data)
+        except NalError as error:
+            raise StreamError(label, f"a damaged picture ({error})", "an H.264 access unit") from None
+        for found in unit.sequence_sets:
+            if (found.width, found.height) != self._size:
+                expected = f"{self._size[0]}x{self._size[1]}"
+                raise StreamError(label, f"a picture of {found.width}x{found.height}", expected)
+        for piece in (piece for piece in unit.slices if piece.first_block == 0):
+            top = self._parser.frame_num_range(piece)
+            if top is None or piece.frame_num is None:
+                continue
+            if not piece.idr and piece.frame_num != self._next:
+                what = "a picture that builds on one that is missing"
+                raise MissingReference(label, what, "every picture from a keyframe on")
+            self._next = (piece.frame_num + 1) % top if piece.reference else piece.frame_num
+
+
+def parse_sequence(unit: bytes) -> SequenceParameters:
+    """Parse a sequence parameter set (7.3.2.1.1).
+
+    Raises:
+        NalError: it breaks off or holds what the standard does not allow.
+    """
+    if len(unit) > MAX_PARAMETER_SET_BYTES:
+        raise NalError(f"a parameter set of {len(unit)} bytes")
+    bits = BitReader(payload(unit))
+    profile = bits.u(8)
+    bits.u(16)  # constraint flags and level
+    number = bits.ue()
+    chroma, depth = _chroma(bits) if profile in _HIGH_PROFILES else (1, 8)
+    frame_num_bits = bits.ue() + 4
+    order_type = _picture_order(bits)
+    bits.ue()  # max_num_ref_frames
+    bits.flag()  # gaps_in_frame_num_value_allowed_flag
+    width, height = 16 * (bits.ue() + 1), bits.ue() + 1
+    progressive = bits.flag()
+    if not progressive:
+        bits.flag()
+    height *= 16 if progressive else 32
+    bits.flag()  # direct_8x8_inference_flag
+    left, right, top, bottom = (bits.ue() for _ in range(4)) if bits.flag() else (0, 0, 0, 0)
+    across, down = (2 if chroma in (1, 2) else 1), (2 if chroma == 1 else 1) * (1 if progressive else 2)
+    width, height = width - across * (left + right), height - down * (top + bottom)
+    if frame_num_bits > 16 or width < 1 or height < 1:
+        raise NalError("a sequence parameter set that the standard does not allow")
+    colour, reorder = _usability(bits) if bits.flag() else (None, None)
+    return SequenceParameters(
+        number,
+        profile,
+        chroma,
+        depth,
+        frame_num_bits,
+        progressive,
+        width,
+        height,
+        reorder,
+        order_type,
+        colour,
+    )
+
+
+def _chroma(bits: BitReader) -> tuple[int, int]:
+    chroma = bits.ue()
+    if chroma == 3:
+        bits.flag()
+    depth = bits.ue() + 8
+    bits.ue()  # bit depth of chroma
+    bits.flag()
+    if bits.flag():  # scaling matrices
+        for index in range(8 if chroma != 3 else 12):
+            if bits.flag():
+                _skip_scaling_list(bits, 16 if index < 6 else 64)
+    return chroma, depth
+
+
+def _skip_scaling_list(bits: BitReader, size: int) -> None:
+    last = following = 8
+    for _ in range(size):
+        if following:
+            following = (last + bits.se()) % 256
+        last = following or last
+
+
+def _picture_order(bits: BitReader) -> int:
+    order_type = bits.ue()
+    if order_type == 0:
+        bits.ue()
+    elif order_type == 1:
+        bits.flag()
+        bits.se()
+        bits.se()
+        cycle = bits.ue()
+        if cycle > MAX_CYCLE:
+            raise NalError(f"a cycle of {cycle} pictures")
+        for _ in range(cycle):
+            bits.se()
+    return order_type
+
+
+def _usability(bits: BitReader) -> tuple[Colour, int | None]:
+    """Video usability information (annex E.1.1): colour, and the pictures that may be reordered."""
+    if bits.flag() and bits.u(8) == _EXTENDED_SAR:
+        bits.u(32)
+    if bits.flag():
+        bits.flag()
+    colour = Colour(False, None, None, None)
+    if bits.flag():
+        bits.u(3)
+        full = bits.flag()
+        described = bits.flag()
+        primaries, transfer, matrix = (bits.u(8) for _ in range(3)) if described else (None, None, None)
+        colour = Colour(full, primaries, transfer, matrix)
+    if bits.flag():  # chroma location
+        bits.ue()
+        bits.ue()
+    if bits.flag():  # timing
+        bits.u(65)
+    models = 0
+    for _ in range(2):
+        if bits.flag():
+            _skip_decoder_model(bits)
+            models += 1
+    if models:
+        bits.flag()
+    bits.flag()  # pic_struct_present_flag
+    reorder = None
+    if bits.flag():
+        bits.flag()
+        for _ in range(4):
+            bits.ue()
+        reorder = bits.ue()
+    return colour, reorder
+
+
+def _skip_decoder_model(bits: BitReader) -> None:
+    count = bits.ue() + 1
+    if count > 32:
+        raise NalError(f"{count} coded picture buffers")
+    bits.u(8)
+    for _ in range(count):
+        bits.ue()
+        bits.ue()
+        bits.flag()
+    bits.u(20)
+
+
+def _picture_set(unit: bytes) -> tuple[int, int]:
+    bits = BitReader(payload(unit, limit=_HEAD_BYTES))
+    return bits.ue(), bits.ue()
