@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from plane_scene import Plane, PlaneScene, grid
 
 from mvcodec.array import Viewpoint
 from mvcodec.errors import SettingError
-from mvcodec.frames import Mask
+from mvcodec.frames import DisparityMap, Mask
+from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
 from mvcodec.synthesis import mlvs
 from mvcodec.synthesis.dils import Dils, DilsSettings
 from mvcodec.synthesis.linear import Linear, LinearSettings
@@ -122,3 +125,33 @@ def test_strips_that_no_pair_covers_are_filled_at_level_3(route: Route) -> None:
     # The textures have no black.
     assert (view.pixels > 0).all()
     assert (view.seen_by[-5:, -5:] == 0).all()
+
+
+@pytest.mark.parametrize("rho", [1.0, 0.5, 1.5])
+@pytest.mark.parametrize("route", Route)
+def test_pictures_can_be_matched_again_at_every_level(route: Route, rho: float) -> None:
+    """With maps that say nothing, only matching the pictures themselves finds the planes."""
+    scene = PlaneScene(grid(3, 3, 150, 110, step=2, rho=rho), 8, (Plane(16, (30, 30, 80, 110)),))
+    truthful = scene.decoded()
+    nothing = DisparityMap(np.zeros((110, 150), np.float32), np.ones((110, 150), np.bool_))
+    decoded = replace(truthful, disparities=dict.fromkeys(truthful.pictures, nothing))
+    matcher = FixedWindow(FixedWindowSettings("census", 7, median_size=5))
+    inside = np.s_[15:-25, 15:-25]
+    for row, col in ((0, 1), (1, 0), (1, 1)):
+        viewpoint = Viewpoint(row, col)
+        truth, _ = scene.render(viewpoint)
+        for method, again in (
+            (
+                Dils(DilsSettings("levels", route=route)),
+                Dils(DilsSettings("levels", route=route, rematch=matcher)),
+            ),
+            (
+                Linear(LinearSettings(fill_holes=True, route=route)),
+                Linear(LinearSettings(fill_holes=True, route=route, rematch=matcher)),
+            ),
+        ):
+            wrong, right = (
+                np.mean((m.render(decoded, viewpoint).pixels != truth)[inside]) for m in (method, again)
+            )
+            assert right < 0.2
+            assert wrong > 0.7

@@ -18,8 +18,10 @@ from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, LayerStack, RenderedView
 from mvcodec.layers.dils import THRESHOLD, average_px
 from mvcodec.layers.table import LAYER_SPLITS
+from mvcodec.stereo.matcher import PairMatcher
 from mvcodec.synthesis import mlvs
 from mvcodec.synthesis.mlvs import Route, View
+from mvcodec.synthesis.rematch import Rematched
 from mvcodec.synthesis.rows import forward_pair
 
 
@@ -33,6 +35,8 @@ class DilsSettings:
         alpha: share of the left picture in the blend (4.17), 0..1.
         fill_holes: False leaves holes black.
         route: how level 3 of MLVS reaches the middle of a cell.
+        rematch: matches the pictures of every pair anew, as the thesis does; by default the decoded maps
+            are used and carried along.
 
     Raises:
         SettingError: a setting is outside its range.
@@ -43,6 +47,7 @@ class DilsSettings:
     alpha: float = 0.5
     fill_holes: bool = True
     route: Route = Route.UPPER_LOWER
+    rematch: PairMatcher | None = None
 
     def __post_init__(self) -> None:
         if self.split not in LAYER_SPLITS:
@@ -61,7 +66,9 @@ class Dils:
 
     def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
         """See `Synthesizer.render`; `disparity_px` is the pixels' own, not their layers' average."""
-        return mlvs.render(decoded, viewpoint, self, self.settings.route)
+        matcher = self.settings.rematch
+        pairs = Rematched(self, matcher, decoded.disparity_range_px) if matcher else self
+        return mlvs.render(decoded, viewpoint, pairs, self.settings.route)
 
     def synthesize_pair(self, left: View, right: View, beta: float, px_per_disparity: float) -> View:
         """See `PairSynthesizer.synthesize_pair`. Shifts are whole px, halves rounded to even."""

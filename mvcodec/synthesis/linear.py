@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from mvcodec.array import MAX_PICTURE_SIDE, Viewpoint
 from mvcodec.frames import DecodedSet, FloatMap, RenderedView
+from mvcodec.stereo.matcher import PairMatcher
 from mvcodec.synthesis import mlvs
 from mvcodec.synthesis.mlvs import Route, View
+from mvcodec.synthesis.rematch import Rematched
 from mvcodec.synthesis.rows import forward_pair
 
 
@@ -25,10 +27,13 @@ class LinearSettings:
     Attributes:
         fill_holes: True fills holes along the row, as DILS does.
         route: how level 3 of MLVS reaches the middle of a cell.
+        rematch: matches the pictures of every pair anew, as the thesis does; by default the decoded maps
+            are used and carried along.
     """
 
     fill_holes: bool = False
     route: Route = Route.UPPER_LOWER
+    rematch: PairMatcher | None = None
 
 
 class Linear:
@@ -39,7 +44,9 @@ class Linear:
 
     def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
         """See `Synthesizer.render`."""
-        return mlvs.render(decoded, viewpoint, self, self.settings.route)
+        matcher = self.settings.rematch
+        pairs = Rematched(self, matcher, decoded.disparity_range_px) if matcher else self
+        return mlvs.render(decoded, viewpoint, pairs, self.settings.route)
 
     def synthesize_pair(self, left: View, right: View, beta: float, px_per_disparity: float) -> View:
         """See `PairSynthesizer.synthesize_pair`. Shifts are whole px, halves rounded to even."""
