@@ -31,7 +31,6 @@ from mvcodec.video.disparity_code import quantise
 from mvcodec.video.table import find_codec
 
 WORKERS = 2
-CODEC = "h264"
 
 DISPARITY_SHARE = 0.4
 """The maps' share in bitrate mode; `default_disparity_qp` came to 0.5 on shop_v3 at QP 32, SGBM maps."""
@@ -52,16 +51,18 @@ class EncoderConfig:
     """Settings of an encoder, checked here.
 
     Attributes:
-        qp: constant quantiser of the pictures, 1..51; None where crf or bitrate_kbps governs.
-        crf: constant quality of the pictures, 1..51.
+        qp: constant quantiser of the pictures, 1..51 (codec av1: 1..63); None where crf or
+            bitrate_kbps governs.
+        crf: constant quality of the pictures, on the same scale.
         bitrate_kbps: average of all video tracks together, kbit/s.
-        disparity_qp: constant quantiser of the maps, 1..51; by default `default_disparity_qp`, or
+        disparity_qp: constant quantiser of the maps, as qp; by default `default_disparity_qp`, or
             a DISPARITY_SHARE of the bit rate. Given, bitrate_kbps is that of the pictures alone.
         gop: frame sets from keyframe to keyframe, at most one second; by default one second.
         matcher: name of a matcher, or one's own.
         preset: effort of the video encoder.
         disparity_range_px: (lo, hi) between neighbouring real cameras; by default estimated from
             the first frame set.
+        codec: of the pictures and the maps, a name of `mvcodec.video.table.CODECS`.
 
     Raises:
         SettingError: a value is outside its range, or not exactly one of qp, crf and
@@ -76,10 +77,13 @@ class EncoderConfig:
     matcher: str | Matcher = "sgbm"
     preset: str = "slow"
     disparity_range_px: tuple[float, float] | None = None
+    codec: str = "h264"
 
     def __post_init__(self) -> None:
-        RateControl(self.qp, self.crf, self.bitrate_kbps)
-        check_qp("disparity_qp", self.disparity_qp)
+        max_qp = find_codec(self.codec).max_qp
+        check_qp("qp", self.qp, max_qp)
+        check_qp("disparity_qp", self.disparity_qp, max_qp)
+        RateControl(self.qp, self.crf, self.bitrate_kbps).check_scale(max_qp)
         check_preset(self.preset)
         if self.gop is not None and self.gop < 1:
             raise SettingError("gop", self.gop, "at least 1")
@@ -201,7 +205,7 @@ class Encoder:
         self.flush()
 
     def _make_encoders(self) -> dict[Track, VideoEncoder]:
-        array, codec = self.array, find_codec(CODEC)
+        array, codec = self.array, find_codec(self.config.codec)
         width, height = even_size(array.width, array.height)
         encoders = {}
         for kind in (TrackKind.TEXTURE, TrackKind.DISPARITY):
@@ -213,13 +217,13 @@ class Encoder:
     def _make_header(self, frames: FrameSet) -> StreamHeader:
         span = self.config.disparity_range_px
         if span is None:
-            from mvcodec.stereo.disparity_range import estimate_range  # noqa: PLC0415 - heavy, and not always needed
+            from mvcodec.stereo.disparity_range import estimate_range
 
             span = estimate_range(self.array, [frames], self.array.disparity_hint_px)
-        return StreamHeader(self.array, span, CODEC, frames.index, self._settings_record())
+        return StreamHeader(self.array, span, self.config.codec, frames.index, self._settings_record())
 
     def _settings_record(self) -> dict[str, Any]:
-        config, codec = self.config, find_codec(CODEC)
+        config, codec = self.config, find_codec(self.config.codec)
         maps = config.rate_of(TrackKind.DISPARITY, len(self.array.real))
         matcher = config.matcher if isinstance(config.matcher, str) else type(config.matcher).__name__
         record = {
@@ -287,6 +291,6 @@ def _packet(track: Track, frames: FrameSet, coded: list[CodedPicture]) -> Packet
 def _matcher(matcher: str | Matcher) -> Matcher:
     if not isinstance(matcher, str):
         return matcher
-    from mvcodec.stereo.table import make_matcher  # noqa: PLC0415 - matchers are heavy to load
+    from mvcodec.stereo.table import make_matcher
 
     return make_matcher(matcher)

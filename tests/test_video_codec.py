@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
+from typing import cast
 
 import av
 import numpy as np
 import pytest
+from av.codec.context import Flags
 from av.video.codeccontext import VideoCodecContext
 from small_arrays import photograph
 
@@ -71,7 +74,10 @@ def test_keyframes_come_when_asked_and_decoding_can_start_at_each(codec: Codec) 
 
 def test_damage_is_an_error_that_names_the_packet(codec: Codec) -> None:
     coded = _coded(codec, _settings(), 3)
-    for broken in (coded[1].data[: len(coded[1].data) // 2], b"no video at all" * 9):
+    damage = [b"no video at all" * 9]
+    if codec is not CODECS["hevc"]:  # whose decoder takes a cut slice for a whole one
+        damage.append(coded[1].data[: len(coded[1].data) // 2])
+    for broken in damage:
         decoder = codec.decoder()
         decoder.push(coded[0].data, "key")
         with pytest.raises(StreamError, match=r"^/camera/r00_c00/video at 0\.1 s: found a damaged picture"):
@@ -81,16 +87,18 @@ def test_damage_is_an_error_that_names_the_packet(codec: Codec) -> None:
 
 
 def test_fewer_bits_at_higher_qp_and_crf(codec: Codec) -> None:
-    sizes = [sum(len(c.data) for c in _coded(codec, _settings(qp=qp))) for qp in (1, 20, 40, 51)]
+    sizes = [sum(len(c.data) for c in _coded(codec, _settings(qp=qp))) for qp in (1, 20, 40, codec.max_qp)]
     assert all(a > b for a, b in pairwise(sizes))
     sizes = [sum(len(c.data) for c in _coded(codec, _settings(crf=crf))) for crf in (15.0, 22.5, 30.0)]
     assert all(a > b for a, b in pairwise(sizes))
 
 
 def test_bitrate_is_met(codec: Codec) -> None:
-    coded = _coded(codec, _settings(bitrate_kbps=200.0), 40)
+    # SVT-AV1's finest quantiser needs less than 200 kbit/s here.
+    rate = 60.0 if codec is CODECS["av1"] else 200.0
+    coded = _coded(codec, _settings(bitrate_kbps=rate), 40)
     kbps = sum(len(picture.data) for picture in coded) * 8 / (40 / 10.0) / 1000
-    assert 140 < kbps < 260
+    assert 0.7 * rate < kbps < 1.3 * rate
 
 
 def test_h264_keyframes_are_idr_with_their_parameter_sets_and_one_slice() -> None:
@@ -112,10 +120,12 @@ def test_h264_profile_is_one_that_players_know(qp: int) -> None:
 
 
 @pytest.mark.parametrize(("kind", "colour_range"), [(TrackKind.TEXTURE, 1), (TrackKind.DISPARITY, 2)])
-def test_h264_tags_matrix_and_range(kind: TrackKind, colour_range: int) -> None:
-    context = VideoCodecContext.create("h264", "r")
-    context.thread_type = "SLICE"
-    (frame,) = context.decode(av.Packet(_coded(CODECS["h264"], _settings(kind), 1)[0].data))
+@pytest.mark.parametrize(("name", "decoder"), [("h264", "h264"), ("hevc", "hevc"), ("av1", "libdav1d")])
+def test_streams_tag_matrix_and_range(kind: TrackKind, colour_range: int, name: str, decoder: str) -> None:
+    context = cast("VideoCodecContext", VideoCodecContext.create(decoder, "r"))
+    context.thread_count = 1
+    context.flags |= Flags.low_delay
+    (frame,) = context.decode(av.Packet(_coded(CODECS[name], _settings(kind), 1)[0].data))
     assert (frame.colorspace, frame.color_range) == (1, colour_range)
     assert (context.color_primaries, context.color_trc) == (1, 1)
     assert not context.has_b_frames
@@ -134,9 +144,9 @@ def test_maps_keep_their_codes_within_the_quantiser(codec: Codec) -> None:
 @pytest.mark.parametrize(
     ("rate", "message"),
     [
-        ({"qp": 0}, r"qp: found 0, expected 1\.\.51 \(0 is lossless"),
-        ({"qp": 52}, r"qp: found 52, expected an integer, 1\.\.51"),
-        ({"crf": 0.0}, r"crf: found 0\.0, expected 1\.\.51"),
+        ({"qp": 0}, r"qp: found 0, expected 1\.\.63 \(0 is lossless"),
+        ({"qp": 64}, r"qp: found 64, expected an integer, 1\.\.63"),
+        ({"crf": 0.0}, r"crf: found 0\.0, expected 1\.\.63"),
         ({"bitrate_kbps": -5.0}, r"bitrate_kbps: found -5\.0"),
         ({}, r"found none of them, expected exactly one"),
         ({"qp": 20, "crf": 20.0}, r"found qp and crf, expected exactly one"),
@@ -145,6 +155,75 @@ def test_maps_keep_their_codes_within_the_quantiser(codec: Codec) -> None:
 def test_bad_rates_are_refused(rate: dict[str, float], message: str) -> None:
     with pytest.raises(SettingError, match=message):
         RateControl(**rate)  # type: ignore[arg-type]
+
+
+def test_each_codec_keeps_to_its_own_scale(codec: Codec) -> None:
+    top = codec.max_qp
+    codec.encoder(_settings(qp=top))
+    with pytest.raises(SettingError, match=rf"expected an integer, 1\.\.{top}"):
+        codec.encoder(_settings(qp=top + 1))
+    with pytest.raises(SettingError, match=rf"expected 1\.\.{top}"):
+        codec.encoder(_settings(crf=top + 0.5))
+
+
+@pytest.mark.parametrize("size", [(2, 2), (34, 18), (32, 32), (1920, 16)])
+def test_a_size_is_coded_or_refused_in_one_line(codec: Codec, size: tuple[int, int]) -> None:
+    width, height = size
+    settings = VideoSettings(TrackKind.TEXTURE, width, height, 10.0, 5, RateControl(qp=20), "medium")
+    rng = np.random.default_rng(1)
+    planes = grey_planes(rng.integers(100, 120, (height, width), np.uint8))
+    encoder = codec.encoder(settings)
+    if (width, height) == (2, 2) and codec is not CODECS["h264"]:
+        with pytest.raises(SettingError, match=f"which refuses {width}x{height}"):
+            encoder.push(planes, True)
+        return
+    (coded,) = encoder.push(planes, True)
+    (found,) = codec.decoder().push(coded.data, "test")
+    assert found.y.shape == (height, width)
+    assert np.abs(found.y.astype(int) - planes.y).mean() < 8
+
+
+def test_pictures_out_of_order_come_back_in_order(codec: Codec) -> None:
+    settings = replace(_settings(), gop=20, low_delay=False)
+    encoder, decoder = codec.encoder(settings), codec.decoder(low_delay=False)
+    coded = []
+    for number in range(20):
+        coded += encoder.push(to_planes(_picture(number)), keyframe=number == 0)
+    assert len(coded) < 20, "no look-ahead"
+    coded += encoder.flush()
+    assert [picture.keyframe for picture in coded] == [True] + [False] * 19
+    planes = [plane for picture in coded for plane in decoder.push(picture.data, "test")] + decoder.flush()
+    assert len(planes) == 20
+    for number, plane in enumerate(planes):
+        error = to_picture(plane, WIDTH, HEIGHT).astype(float) - _picture(number)
+        assert math.sqrt(np.mean(error**2)) < 8
+
+
+def test_hevc_keyframes_carry_their_parameter_sets_and_no_text() -> None:
+    for picture in _coded(CODECS["hevc"], _settings()):
+        types = [unit[0] >> 1 & 63 for unit in annexb.nal_units(picture.data)]
+        assert types in ([[32, 33, 34, 19], [32, 33, 34, 20]] if picture.keyframe else [[1]])
+
+
+def test_av1_keyframes_carry_a_sequence_header() -> None:
+    delimiter, sequence_header, frame = 2, 1, 6
+    for picture in _coded(CODECS["av1"], _settings()):
+        expected = [delimiter, sequence_header, frame] if picture.keyframe else [delimiter, frame]
+        assert _obu_types(picture.data) == expected
+
+
+def _obu_types(data: bytes) -> list[int]:
+    """obu_type of each unit of a temporal unit in the low-overhead format (AV1, section 5.3)."""
+    types, at = [], 0
+    while at < len(data):
+        assert data[at] & 2, "an OBU without its size"
+        types.append(data[at] >> 3 & 15)
+        size, shift, more = 0, 0, True
+        while more:
+            at += 1
+            size, shift, more = size | (data[at] & 127) << shift, shift + 7, bool(data[at] & 128)
+        at += 1 + size
+    return types
 
 
 def test_unknown_names_are_refused_with_the_choices() -> None:

@@ -22,6 +22,7 @@ from mvcodec.frames import FrameSet
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
 from mvcodec.stereo.table import MATCHERS
 from mvcodec.video.codec import PRESETS
+from mvcodec.video.table import CODECS
 
 SUFFIX = ".mcap"
 
@@ -33,6 +34,7 @@ OPTIONS = {
     "gop": "--gop",
     "matcher": "--matcher",
     "preset": "--preset",
+    "codec": "--codec",
 }
 """The encoder's settings as the user wrote them."""
 
@@ -60,10 +62,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the cameras to code (default: corners, or both ends of a linear array)",
     )
     rate = parser.add_mutually_exclusive_group()
-    rate.add_argument("--qp", type=int, metavar="N", help=f"constant QP, 1..51 (default: {default.qp})")
+    rate.add_argument(
+        "--qp", type=int, metavar="N", help=f"constant QP, 1..51, av1 1..63 (default: {default.qp})"
+    )
     rate.add_argument("--crf", type=float, metavar="N", help="constant rate factor")
     rate.add_argument(
         "--bitrate", type=float, metavar="KBPS", help="kbit/s of the pictures and maps of all cameras"
+    )
+    parser.add_argument(
+        "--codec",
+        choices=CODECS,
+        default=default.codec,
+        help="of pictures and maps (default: %(default)s, which viewers are sure to play)",
     )
     parser.add_argument("--disparity-qp", type=int, metavar="N", help="QP of the disparity maps")
     parser.add_argument(
@@ -79,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--preset",
         default=default.preset,
         metavar="NAME",
-        help=f"effort of x264, one of {', '.join(PRESETS)} (default: %(default)s)",
+        help=f"effort of the video encoder, one of {', '.join(PRESETS)} (default: %(default)s)",
     )
     parser.add_argument(
         "--disparity-range",
@@ -159,6 +169,7 @@ def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
             gop=arguments.gop,
             matcher=arguments.matcher,
             preset=arguments.preset,
+            codec=arguments.codec,
         )
         Encoder(array, config).flush()
     except SettingError as error:

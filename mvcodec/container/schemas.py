@@ -55,6 +55,10 @@ PROTOBUF_SCHEMAS: dict[str, tuple[str, bytes]] = {
 """Kind of message -> (schema name, serialised FileDescriptorSet)."""
 
 
+VIDEO_FORMATS = {"h264": "h264", "hevc": "h265", "av1": "av1"}
+"""The header's name of a codec -> foxglove.CompressedVideo's; a name not listed is itself."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RigMessage:
     """A message about the rig; it says the same at all times.
@@ -87,7 +91,8 @@ def rig_messages(array: CameraArray) -> tuple[RigMessage, ...]:
 def video_message(packet: Packet, codec: str) -> bytes:
     """A serialised foxglove.CompressedVideo of a packet."""
     assert packet.track.camera is not None
-    message = CompressedVideo(frame_id=frame_id(packet.track.camera), data=packet.data, format=codec)
+    name = VIDEO_FORMATS.get(codec, codec)
+    message = CompressedVideo(frame_id=frame_id(packet.track.camera), data=packet.data, format=name)
     message.timestamp.FromNanoseconds(packet.time_ns)
     data: bytes = message.SerializeToString()
     return data
@@ -103,8 +108,9 @@ def video_data(message: bytes, source: str, codec: str) -> bytes:
         parsed = CompressedVideo.FromString(message)
     except DecodeError as error:
         raise StreamError(source, f"a damaged message ({error})", "foxglove.CompressedVideo") from None
-    if parsed.format != codec:
-        raise StreamError(source, f"video of format {parsed.format!r}", f"{codec!r}, as the header says")
+    expected = VIDEO_FORMATS.get(codec, codec)
+    if parsed.format != expected:
+        raise StreamError(source, f"video of format {parsed.format!r}", f"{expected!r}, as the header says")
     data: bytes = parsed.data
     return data
 

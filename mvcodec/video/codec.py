@@ -27,6 +27,9 @@ PRESETS = (
     "placebo",
 )
 
+WIDEST_SCALE = 63
+"""The highest QP of any codec (AV1's)."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Planes:
@@ -47,12 +50,12 @@ class RateControl:
     """How a track's bits are governed; exactly one of the three is set.
 
     Attributes:
-        qp: constant quantiser, 1..51.
-        crf: constant quality, 1..51.
+        qp: constant quantiser, from 1 on, on the codec's own scale.
+        crf: constant quality, from 1 on, on the codec's own scale.
         bitrate_kbps: average bit rate, kbit/s.
 
     Raises:
-        SettingError: none or several are set, or one is outside its range.
+        SettingError: none or several are set, or one is outside the range of every codec.
     """
 
     qp: int | None = None
@@ -64,19 +67,33 @@ class RateControl:
         if len(given) != 1:
             found = " and ".join(given) or "none of them"
             raise SettingError("qp, crf, bitrate_kbps", found, "exactly one of the three")
-        check_qp("qp", self.qp)
-        if self.crf is not None and not 1 <= self.crf <= 51:
-            raise SettingError("crf", self.crf, "1..51")
+        self.check_scale(WIDEST_SCALE)
         if self.bitrate_kbps is not None and not 1 <= self.bitrate_kbps <= 10_000_000:
             raise SettingError("bitrate_kbps", self.bitrate_kbps, "1..10000000 kbit/s")
 
+    def check_scale(self, max_qp: int) -> None:
+        """Raise SettingError where qp or crf is outside a codec's scale."""
+        check_qp("qp", self.qp, max_qp)
+        if self.crf is not None and not 1 <= self.crf <= max_qp:
+            raise SettingError("crf", self.crf, f"1..{max_qp}")
 
-def check_qp(setting: str, qp: int | None) -> None:
-    """Raise SettingError where a quantiser is given and is outside 1..51."""
+    def options(self) -> dict[str, str]:
+        """As libavcodec's encoders call it."""
+        if self.qp is not None:
+            return {"qp": str(self.qp)}
+        if self.crf is not None:
+            return {"crf": f"{self.crf:g}"}
+        assert self.bitrate_kbps is not None
+        return {"b": str(round(self.bitrate_kbps * 1000))}
+
+
+def check_qp(setting: str, qp: int | None, max_qp: int) -> None:
+    """Raise SettingError where a quantiser is given and is outside 1..max_qp."""
     if qp == 0:
-        raise SettingError(setting, 0, "1..51 (0 is lossless coding, a profile that players don't decode)")
-    if qp is not None and not (isinstance(qp, int) and 1 <= qp <= 51):
-        raise SettingError(setting, qp, "an integer, 1..51")
+        expected = f"1..{max_qp} (0 is lossless coding, a profile that players don't decode)"
+        raise SettingError(setting, 0, expected)
+    if qp is not None and not (isinstance(qp, int) and 1 <= qp <= max_qp):
+        raise SettingError(setting, qp, f"an integer, 1..{max_qp}")
 
 
 def check_preset(preset: str) -> None:
@@ -96,6 +113,7 @@ class VideoSettings:
         gop: pictures from keyframe to keyframe, at most.
         rate: bits or quality.
         preset: effort, one of PRESETS.
+        low_delay: each picture comes out at once; else the preset's own B-pictures and look-ahead.
     """
 
     kind: TrackKind
@@ -105,6 +123,7 @@ class VideoSettings:
     gop: int
     rate: RateControl
     preset: str
+    low_delay: bool = True
 
     def __post_init__(self) -> None:
         check_preset(self.preset)
@@ -149,6 +168,14 @@ class VideoDecoder(Protocol):
         ...
 
 
+class DecoderFactory(Protocol):
+    """Makes the decoder of one track."""
+
+    def __call__(self, low_delay: bool = True) -> VideoDecoder:
+        """`low_delay`: as in the settings that the track was coded with."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Codec:
     """A stock video codec.
@@ -157,8 +184,12 @@ class Codec:
         encoder: makes the encoder of one track.
         decoder: makes the decoder of one track.
         settings: the codec's own settings for a kind of track, for the record in the header.
+        options: all options that its encoder is given, by name.
+        max_qp: the coarsest of its quantisers; the finest is 1.
     """
 
     encoder: Callable[[VideoSettings], VideoEncoder]
-    decoder: Callable[[], VideoDecoder]
+    decoder: DecoderFactory
     settings: Callable[[TrackKind], str]
+    options: Callable[[VideoSettings], dict[str, str]]
+    max_qp: int

@@ -1,0 +1,59 @@
+"""AV1 by SVT-AV1 and dav1d: options."""
+
+from __future__ import annotations
+
+import os
+
+from mvcodec.stream import TrackKind
+from mvcodec.video.codec import PRESETS, VideoDecoder, VideoEncoder, VideoSettings
+from mvcodec.video.pyav import PyavDecoder, PyavEncoder
+
+MAX_QP = 63
+
+SVT_PRESETS = dict(zip(PRESETS, (12, 11, 10, 9, 8, 6, 4, 3, 2, 1), strict=True))
+"""SVT-AV1's numbers for the efforts that x264 and x265 have names for; medium and slow take about
+as long as x265's (960 x 640)."""
+
+_AT_ONCE = "pred-struct=1:lookahead=0"
+_REORDERED = "pred-struct=2"
+_ALWAYS = "scd=0:lp=1"
+
+SVT_PARAMS = {
+    TrackKind.TEXTURE: "tune=1",
+    TrackKind.DISPARITY: "tune=1",
+}
+"""tune=1 is PSNR: the counterpart of x264's psy=0."""
+
+
+def av1_settings(kind: TrackKind) -> str:
+    """SVT-AV1's parameters for a kind of track, beyond preset and rate."""
+    return SVT_PARAMS[kind]
+
+
+def av1_encoder(settings: VideoSettings) -> VideoEncoder:
+    """SVT-AV1; closed GOPs, a sequence header with each keyframe, low-overhead format."""
+    os.environ.setdefault("SVT_LOG", "0")  # what fails is told as an error; it reads this when it starts
+    return PyavEncoder("libsvtav1", av1_options(settings), settings)
+
+
+def av1_decoder(low_delay: bool = True) -> VideoDecoder:
+    """dav1d."""
+    return PyavDecoder("libdav1d", "an AV1 temporal unit", low_delay)
+
+
+def av1_options(settings: VideoSettings) -> dict[str, str]:
+    """Options of libsvtav1.
+
+    Raises:
+        SettingError: the rate is outside of AV1's scale.
+    """
+    rate = settings.rate
+    rate.check_scale(MAX_QP)
+    delay = _AT_ONCE if settings.low_delay else _REORDERED
+    params = f"{delay}:{_ALWAYS}:keyint={settings.gop}:{SVT_PARAMS[settings.kind]}"
+    options = {"preset": str(SVT_PRESETS[settings.preset]), **rate.options()}
+    if "b" in options:
+        # Without delay SVT-AV1 knows constant bit rate only: maximum = average.
+        params += ":rc=2"
+        options |= {"maxrate": options["b"], "bufsize": str(2 * int(options["b"]))}
+    return {**options, "svtav1-params": params}

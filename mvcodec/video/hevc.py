@@ -1,0 +1,54 @@
+"""HEVC (H.265) by libx265 and FFmpeg's decoder: options."""
+
+from __future__ import annotations
+
+from mvcodec.stream import TrackKind
+from mvcodec.video.codec import VideoDecoder, VideoEncoder, VideoSettings
+from mvcodec.video.pyav import PyavDecoder, PyavEncoder
+
+MAX_QP = 51
+
+_AT_ONCE = "bframes=0:rc-lookahead=0"
+
+# One thread and no wavefronts (which cost bits), no text about the encoder, no open GOPs, and
+# keyframes when the encoder asks for them.
+_ALWAYS = (
+    "log-level=none:pools=none:frame-threads=1:wpp=0:info=0:scenecut=0:annexb=1:repeat-headers=1:open-gop=0"
+)
+
+X265_PARAMS = {
+    TrackKind.TEXTURE: "psy-rd=0:psy-rdoq=0",
+    TrackKind.DISPARITY: "psy-rd=0:psy-rdoq=0:aq-mode=0",
+}
+
+
+def hevc_settings(kind: TrackKind) -> str:
+    """x265's parameters for a kind of track, beyond preset and rate."""
+    return X265_PARAMS[kind]
+
+
+def hevc_encoder(settings: VideoSettings) -> VideoEncoder:
+    """libx265; closed GOPs, VPS, SPS and PPS with each keyframe, Annex B."""
+    return PyavEncoder("libx265", hevc_options(settings), settings)
+
+
+def hevc_decoder(low_delay: bool = True) -> VideoDecoder:
+    """FFmpeg's own decoder."""
+    return PyavDecoder("hevc", "an HEVC access unit", low_delay)
+
+
+def hevc_options(settings: VideoSettings) -> dict[str, str]:
+    """Options of libx265.
+
+    Raises:
+        SettingError: the rate is outside of HEVC's scale.
+    """
+    settings.rate.check_scale(MAX_QP)
+    delay = f"{_AT_ONCE}:" if settings.low_delay else ""
+    params = f"{delay}{_ALWAYS}:keyint={settings.gop}:{X265_PARAMS[settings.kind]}"
+    return {
+        "preset": settings.preset,
+        "forced-idr": "1",
+        "x265-params": params,
+        **settings.rate.options(),
+    }
