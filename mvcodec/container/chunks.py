@@ -3,32 +3,43 @@
 from __future__ import annotations
 
 import io
-import struct
-import warnings
+import json
 from bisect import bisect_left
-from collections.abc import Iterator
-from typing import IO, BinaryIO, cast
+from collections.abc import Callable, Iterator
+from typing import BinaryIO
 
-import zstandard
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import EndOfFile, InvalidMagic, McapError
-from mcap.reader import make_reader
-from mcap.records import Channel, Chunk, McapRecord, Message, MessageIndex
-from mcap.stream_reader import StreamReader, breakup_chunk
-from mcap.summary import Summary
-from mcap.writer import MCAP0_MAGIC
+from mcap.opcode import Opcode
+from mcap.records import Channel, ChunkIndex, Message, MessageIndex, Metadata
 
-from mvcodec.errors import MvCodecWarning, StreamError
-
-MAX_RECORD_BYTES = 1 << 30
-"""The largest record, packed or unpacked, that is read; a larger one is taken for damage."""
+from mvcodec.container.exact_file import ExactFile
+from mvcodec.container.file_index import FileIndex, read_index
+from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.container.records import (
+    DAMAGE,
+    MAGIC,
+    ChunkHead,
+    CutOff,
+    FramingError,
+    RecordError,
+    chunk_records,
+    find_chunk,
+    parse_channel,
+    parse_chunk,
+    parse_message,
+    read_record,
+    unpack,
+)
+from mvcodec.errors import StreamError
 
 EXPECTED = "an MCAP file written by mvcodec"
 
-# What the MCAP library, struct and zstandard raise on damaged bytes (a failed CRC is a ValueError).
-_DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError, KeyError)
+METADATA_NAME = "mvcodec"
+TOPICS_KEY = "topics"
+"""In a metadata record: which topic each channel is, for readers that lack the first chunk."""
 
 TopicMessage = tuple[str, Message]
+OnDamage = Callable[[StreamError], None]
 
 
 class ChunkReader:
@@ -37,25 +48,40 @@ class ChunkReader:
     Args:
         file: binary input, which may be a pipe.
         name: what to call it in messages.
+        limits: what is more than that is refused.
+        on_damage: told of damage, behind which reading goes on; None raises it.
+
+    Attributes:
+        cut_off: the input broke off (known when `chunks` has ended).
+        partial: the chunk delivered last is one that breaks off.
 
     Raises (also while iterating):
-        StreamError: not an MCAP file, or a damaged one.
+        StreamError: not an MCAP file, or damage where there is no `on_damage`.
     """
 
-    def __init__(self, file: BinaryIO, name: str) -> None:
+    def __init__(
+        self,
+        file: BinaryIO,
+        name: str,
+        limits: Limits = DEFAULT_LIMITS,
+        on_damage: OnDamage | None = None,
+    ) -> None:
         self._file = ExactFile(file)
-        self._name = name
+        self._name, self._limits, self._on_damage = name, limits, on_damage
         self._channels: dict[int, Channel] = {}
+        self._fallback: dict[int, str] = {}
         self._last_time_ns: int | None = None
-        self._summary = self._read_summary() if file.seekable() else None
-        if self._summary is not None:
-            self._channels.update(self._summary.channels)
-            self._index = sorted(self._summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset)
+        self._damaged = False
+        self._index_damage = ""
+        self.cut_off = self.partial = False
+        self._index = self._read_index() if file.seekable() else None
+        if self._index is not None:
+            self._channels.update(self._index.channels)
 
     @property
     def indexed(self) -> bool:
         """Whether the file is complete, with an index; otherwise it is read once, front to back."""
-        return self._summary is not None
+        return self._index is not None
 
     @property
     def bytes_read(self) -> int:
@@ -73,156 +99,208 @@ class ChunkReader:
         return {channel.topic for channel in self._channels.values()}
 
     def chunks(self, first: int = 0) -> Iterator[list[TopicMessage]]:
-        """The chunks in file order; from chunk `first`, if the file is indexed.
-
-        Where an input that is not indexed breaks off, one MvCodecWarning says at what time.
-        """
-        return self._indexed(first) if self.indexed else self._streamed()
+        """The chunks in file order; from chunk `first`, if the file is indexed."""
+        return self._streamed() if self._index is None else self._indexed(self._index.chunks[first:])
 
     def chunk_at(self, time_ns: int) -> int:
         """The first chunk of an indexed file that does not end before a time."""
-        return bisect_left(self._index, time_ns, key=lambda chunk: chunk.message_end_time)
+        assert self._index is not None
+        return bisect_left(self._index.chunks, time_ns, key=lambda chunk: chunk.message_end_time)
 
     def times(self, topic: str) -> list[int]:
         """Log times of a topic's messages in an indexed file, ascending, ns."""
+        assert self._index is not None
         numbers = [number for number, channel in self._channels.items() if channel.topic == topic]
         times: list[int] = []
-        try:
-            for chunk in self._index:
-                for number in numbers:
-                    if (offset := chunk.message_index_offsets.get(number)) is not None:
-                        self._file.seek(offset + _RECORD_HEAD)
-                        entries = MessageIndex.read(ReadDataStream(self._file.as_io()))
-                        times += [time_ns for time_ns, _ in entries.records]
-        except _DAMAGE as error:
-            raise StreamError(self._name, f"a damaged index ({error})", EXPECTED) from None
+        for chunk in self._index.chunks:
+            for number in numbers:
+                if (offset := chunk.message_index_offsets.get(number)) is not None:
+                    times += self._indexed_times(offset)
         return sorted(times)
 
-    def _read_summary(self) -> Summary | None:
-        """The summary of a complete file; None where there is none to be read."""
-        file = self._file
-        summary = None
-        if file.seek(0, io.SEEK_END) > 2 * len(MCAP0_MAGIC):
-            file.seek(-len(MCAP0_MAGIC), io.SEEK_END)
-            if file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC:
-                file.seek(0)
-                try:
-                    summary = make_reader(file.as_io()).get_summary()
-                except _DAMAGE:  # reading from front to back finds out what is wrong
-                    summary = None
-        file.seek(0)
-        return summary if summary is not None and summary.chunk_indexes else None
+    def _indexed_times(self, offset: int) -> list[int]:
+        self._file.seek(offset)
+        try:
+            record = read_record(self._file, self._limits)
+            if record is None or record[0] != Opcode.MESSAGE_INDEX:
+                raise RecordError("no message index where the index says")
+            index = MessageIndex.read(ReadDataStream(io.BytesIO(record[1])))
+        except (RecordError, CutOff, *DAMAGE) as error:
+            raise StreamError(self._name, f"a damaged index ({error})", EXPECTED) from None
+        return [time_ns for time_ns, _ in index.records]
 
-    def _indexed(self, first: int) -> Iterator[list[TopicMessage]]:
-        for index in self._index[first:]:
+    def _read_index(self) -> FileIndex | None:
+        index = None
+        try:
+            index = read_index(self._file, self._limits)
+        except RecordError as error:  # the data may be whole: they are read from front to back
+            self._index_damage = str(error)
+        self._file.seek(0)
+        return index
+
+    def _indexed(self, chunks: list[ChunkIndex]) -> Iterator[list[TopicMessage]]:
+        for index in chunks:
             self._file.seek(index.chunk_start_offset)
-            reader = StreamReader(
-                self._file.as_io(), skip_magic=True, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES
-            )
             try:
-                record = next(reader.records)
-            except _DAMAGE as error:
-                raise self._damaged(error) from None
-            yield self._messages(record)
+                record = read_record(self._file, self._limits)
+                if record is None or record[0] != Opcode.CHUNK:
+                    raise RecordError("no chunk where the index says")
+                head, data = parse_chunk(record[1], self._limits)
+                _compare(head, index)
+                messages = self._messages(unpack(head, data, self._limits))
+            except (RecordError, CutOff) as error:
+                times = (index.message_start_time, index.message_end_time)
+                self._report(str(error), times, list(index.message_index_offsets))
+                continue
+            yield messages
 
     def _streamed(self) -> Iterator[list[TopicMessage]]:
-        start = self._file.count
-        reader = StreamReader(self._file.as_io(), emit_chunks=True, record_size_limit=MAX_RECORD_BYTES)
-        try:
-            for record in reader.records:
-                if messages := self._messages(record):
+        self._start()
+        while True:
+            checksum = self._file.crc
+            try:
+                record = read_record(self._file, self._limits)
+            except CutOff as cut:
+                self._file.give_back(cut.content)
+                if cut.content and find_chunk(self._file, self._limits):
+                    self._report("a record that is longer than what follows")
+                    continue
+                if cut.opcode == Opcode.CHUNK and (messages := self._salvage(cut.content)):
+                    self.partial = True
                     yield messages
-        except EndOfFile:
-            if self._file.count == start:
-                raise StreamError(self._name, "an empty file", EXPECTED) from None
-            if self._last_time_ns is None:
-                raise StreamError(self._name, "a file cut off before its first frame set", EXPECTED) from None
-            text = f"{self._name}: cut off after {self._last_time_ns / 1e9:.3f} s; all before that is whole"
-            warnings.warn(text, MvCodecWarning, stacklevel=2)
-        except InvalidMagic:
-            what = "a file that is not MCAP" if self._last_time_ns is None else "a damaged end"
-            raise StreamError(self._name, what, EXPECTED) from None
-        except _DAMAGE as error:
-            raise self._damaged(error) from None
+                self.cut_off = True
+                return
+            except RecordError as error:
+                self._report(str(error))
+                if not find_chunk(self._file, self._limits):
+                    return
+                continue
+            if record is None:
+                self.cut_off = True
+                return
+            opcode, content = record
+            if opcode == Opcode.FOOTER:
+                self._end()
+                return
+            if opcode == Opcode.DATA_END:
+                self._check_data(content, checksum)
+            elif messages := self._record(opcode, content):
+                yield messages
 
-    def _messages(self, record: McapRecord) -> list[TopicMessage]:
-        """The messages of a chunk (or one outside of chunks); notes channels on the way."""
-        records = self._unpack(record) if isinstance(record, Chunk) else [record]
+    def _start(self) -> None:
+        magic = self._file.read(len(MAGIC))
+        if magic == MAGIC or (magic and len(magic) < len(MAGIC) and MAGIC.startswith(magic)):
+            return
+        if not magic:
+            raise StreamError(self._name, "an empty file", EXPECTED)
+        # A pipe that was joined late begins anywhere.
+        if self._on_damage is None or not find_chunk(self._file, self._limits):
+            raise StreamError(self._name, "a file that is not MCAP", EXPECTED)
+        self._report("no start of a file: it was joined late, or its start is damaged")
+
+    def _record(self, opcode: int, content: bytes) -> list[TopicMessage]:
+        """The messages of a chunk, or of one outside of chunks; notes channels on the way."""
+        try:
+            if opcode == Opcode.CHUNK:
+                return self._chunk(content)
+            if opcode == Opcode.CHANNEL:
+                channel = parse_channel(content)
+                self._channels[channel.id] = channel
+            elif opcode == Opcode.METADATA:
+                self._note_channels(content)
+            elif opcode == Opcode.MESSAGE:
+                message = parse_message(content)
+                self._last_time_ns = message.log_time
+                return [(self._topic(message), message)]
+        except RecordError as error:
+            self._report(str(error))
+        return []
+
+    def _chunk(self, content: bytes) -> list[TopicMessage]:
+        times = None
+        try:
+            head, data = parse_chunk(content, self._limits)
+            times = (head.start_ns, head.end_ns)
+            return self._messages(unpack(head, data, self._limits))
+        except FramingError as error:
+            self._report(str(error))
+            self._file.give_back(content)
+            find_chunk(self._file, self._limits)
+        except RecordError as error:
+            self._report(str(error), times, list(self._channels))
+        return []
+
+    def _messages(self, data: bytes, *, whole: bool = True) -> list[TopicMessage]:
         messages = []
-        for item in records:
+        for item in chunk_records(data, whole=whole):
             if isinstance(item, Channel):
                 self._channels[item.id] = item
-            elif isinstance(item, Message):
-                if item.channel_id not in self._channels:
-                    raise StreamError(self._name, f"a message of unknown channel {item.channel_id}", EXPECTED)
-                messages.append((self._channels[item.channel_id].topic, item))
+            else:
+                messages.append((self._topic(item), item))
         if messages:
             self._last_time_ns = messages[-1][1].log_time
         return messages
 
-    def _unpack(self, chunk: Chunk) -> list[McapRecord]:
-        if chunk.compression not in ("", "zstd"):
-            raise StreamError(self._name, f"chunks packed with {chunk.compression!r}", "zstd")
+    def _topic(self, message: Message) -> str:
+        channel = self._channels.get(message.channel_id)
+        topic = self._fallback.get(message.channel_id) if channel is None else channel.topic
+        if topic is None:
+            raise RecordError(f"a message of unknown channel {message.channel_id}")
+        return topic
+
+    def _note_channels(self, content: bytes) -> None:
         try:
-            size = chunk.uncompressed_size
-            if chunk.compression == "zstd":  # which believes its own head, not the chunk's
-                size = max(size, zstandard.frame_content_size(chunk.data))
-            if size > MAX_RECORD_BYTES:
-                raise StreamError(self._name, f"a chunk of {size} bytes", f"at most {MAX_RECORD_BYTES}")
-            return breakup_chunk(chunk, validate_crc=True)
-        except _DAMAGE as error:
-            raise self._damaged(error) from None
+            record = Metadata.read(ReadDataStream(io.BytesIO(content)))
+            if record.name == METADATA_NAME and TOPICS_KEY in record.metadata:
+                topics = json.loads(record.metadata[TOPICS_KEY])
+                self._fallback = {int(number): str(topic) for number, topic in topics.items()}
+        except (*DAMAGE, TypeError, AttributeError, RecursionError) as error:
+            raise RecordError(f"damaged metadata ({error})") from None
 
-    def _damaged(self, error: Exception) -> StreamError:
-        at = "at its start" if self._last_time_ns is None else f"after {self._last_time_ns / 1e9:.3f} s"
-        return StreamError(self._name, f"damage {at} ({str(error) or type(error).__name__})", EXPECTED)
+    def _salvage(self, content: bytes) -> list[TopicMessage]:
+        """What is there of a chunk that breaks off. Its checksum is lost; decoders find damage."""
+        try:
+            head, data = parse_chunk(content, self._limits, whole=False)
+            return self._messages(unpack(head, data, self._limits, whole=False), whole=False)
+        except RecordError:
+            return []
+
+    def _check_data(self, content: bytes, checksum: int) -> None:
+        """Compare the checksum of all that was read, which finds what no chunk's own does."""
+        expected = int.from_bytes(content[:4], "little")
+        if expected and expected != checksum and not self._damaged:
+            self._report("data whose checksum is wrong, somewhere outside of chunks")
+
+    def _end(self) -> None:
+        magic = self._file.read(len(MAGIC))
+        if MAGIC.startswith(magic) and magic != MAGIC:
+            self.cut_off = True
+        elif magic != MAGIC:
+            self._report("a damaged end")
+        elif self._index_damage:
+            self._report(f"a damaged index: {self._index_damage}")
+
+    def _report(
+        self, what: str, times_ns: tuple[int, int] | None = None, channels: list[int] | None = None
+    ) -> None:
+        self._damaged = True
+        where = self._name
+        if times_ns is not None:
+            topics = sorted(
+                {self._channels[number].topic for number in channels or () if number in self._channels}
+            )
+            others = f" and {len(topics) - 1} more topics" if len(topics) > 1 else ""
+            named = f"{topics[0]}{others} " if topics else ""
+            where += f": {named}at {times_ns[0] / 1e9:.3f}..{times_ns[1] / 1e9:.3f} s"
+        elif self._last_time_ns is not None:
+            where += f": after {self._last_time_ns / 1e9:.3f} s"
+        error = StreamError(where, f"damage ({what})", EXPECTED)
+        if self._on_damage is None:
+            raise error
+        self._on_damage(error)
 
 
-_RECORD_HEAD = 9
-"""Bytes of opcode and length before a record's content."""
-
-
-class ExactFile:
-    """A binary input whose `read` returns all that was asked for or raises EndOfFile.
-
-    The MCAP library takes a short read for a whole one, and so trips over a cut file later,
-    somewhere else. Counts the bytes that were read.
-    """
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self.count = 0
-
-    def as_io(self) -> IO[bytes]:
-        """This, as the MCAP library's annotations want it (it calls no more than is here)."""
-        return cast("IO[bytes]", self)
-
-    def read(self, size: int) -> bytes:
-        """Exactly `size` bytes."""
-        if size > MAX_RECORD_BYTES:
-            raise McapError(f"a length of {size} bytes")
-        data = self._file.read(size)
-        self.count += len(data)
-        while len(data) < size:  # an unbuffered pipe gives what it has
-            more = self._file.read(size - len(data))
-            if not more:
-                raise EndOfFile
-            self.count += len(more)
-            data += more
-        return data
-
-    def seekable(self) -> bool:
-        """Whether `seek` works."""
-        return self._file.seekable()
-
-    @property
-    def size(self) -> int:
-        """Bytes of a seekable file."""
-        place = self._file.tell()
-        size = self._file.seek(0, io.SEEK_END)
-        self._file.seek(place)
-        return size
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """As any file's."""
-        return self._file.seek(offset, whence)
+def _compare(head: ChunkHead, index: ChunkIndex) -> None:
+    said = (index.message_start_time, index.message_end_time, index.uncompressed_size, index.compression)
+    if said != (head.start_ns, head.end_ns, head.size, head.compression):
+        raise RecordError("a chunk that differs from its index")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from bisect import bisect_right
 from collections.abc import Iterator
 from itertools import chain
@@ -12,8 +13,9 @@ from typing import BinaryIO, Self
 from mcap.records import Message
 
 from mvcodec.container import schemas
-from mvcodec.container.chunks import EXPECTED, ChunkReader, TopicMessage
-from mvcodec.errors import InputError, SettingError, StreamError
+from mvcodec.container.chunks import EXPECTED, ChunkReader, OnDamage, TopicMessage
+from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.errors import InputError, MvCodecWarning, SettingError, StreamError
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track
 
 
@@ -22,28 +24,45 @@ class McapReader:
 
     A complete file is read by its index: a range of frames costs only the chunks that hold it.
     Anything else (a pipe, a file cut short) is read from front to back, once; where it breaks off,
-    every complete chunk is delivered and then one MvCodecWarning says at what time.
+    every complete frame set is delivered and then one MvCodecWarning says at what time.
 
     Args:
         file: binary input, which may be a pipe; it stays open.
         name: what to call it in messages.
+        limits: what is more than that is refused.
+        on_damage: told of damage, behind which reading goes on with the next keyframe; None raises it.
 
     Raises:
         StreamError: not an MCAP file, none of ours, or one of a newer format version.
     """
 
-    def __init__(self, file: BinaryIO, name: str = "input") -> None:
+    def __init__(
+        self,
+        file: BinaryIO,
+        name: str = "input",
+        limits: Limits = DEFAULT_LIMITS,
+        on_damage: OnDamage | None = None,
+    ) -> None:
         self.name = name
+        self._limits = limits
         self._owned: BinaryIO | None = None
-        self._chunks = ChunkReader(file, name)
+        self._on_damage = on_damage
+        self._gap = False
+        self._chunks = ChunkReader(file, name, limits, None if on_damage is None else self._skip)
         if self._chunks.indexed and HEADER_TRACK.topic not in self._chunks.topics:
             raise self._headless()
         self._rest = self._chunks.chunks()
         self.header = StreamHeader.from_json(self._first_header().data, name)
+        limits.check_header(self.header, name)
         self._tracks = {track.topic: track for track in (HEADER_TRACK, *self.header.tracks)}
 
     @classmethod
-    def open(cls, source: str | Path | BinaryIO) -> McapReader:
+    def open(
+        cls,
+        source: str | Path | BinaryIO,
+        limits: Limits = DEFAULT_LIMITS,
+        on_damage: OnDamage | None = None,
+    ) -> McapReader:
         """Open a path, or take a binary file or pipe.
 
         Raises:
@@ -51,13 +70,13 @@ class McapReader:
             StreamError: as the constructor.
         """
         if not isinstance(source, str | Path):
-            return cls(source, str(getattr(source, "name", "input")))
+            return cls(source, str(getattr(source, "name", "input")), limits, on_damage)
         try:
             file = Path(source).open("rb")  # noqa: SIM115 - `close` closes it
         except OSError as error:
             raise InputError(source, error.strerror, "a file that can be read") from None
         try:
-            reader = cls(file, str(source))
+            reader = cls(file, str(source), limits, on_damage)
         except BaseException:
             file.close()
             raise
@@ -124,18 +143,26 @@ class McapReader:
         """
         chunks, first_ns, number = self._rest, 0, -1
         if self._chunks.indexed:
+            self._gap = False
             first_ns, number = self._keyframe_before(start)
             chunks = self._chunks.chunks(self._chunks.chunk_at(first_ns))
-        index, keyframe = None, False
-        for topic, message in chain.from_iterable(chunks):
+        index = self.header.first_frame + number
+        last: Packet | None = None
+        keyframe = False
+        for topic, message in chain.from_iterable(map(self._whole_sets, chunks)):
             track = self._tracks.get(topic)
-            if track is None or message.log_time < first_ns:
+            if track is None or message.log_time < first_ns or (self._gap and track is not HEADER_TRACK):
                 continue
-            if message.sequence != index:
-                index, number, keyframe = message.sequence, number + 1, track is HEADER_TRACK
+            if last is None or message.sequence != index:
+                # Numbers go on by one, but over a gap by what is missing.
+                number += max(message.sequence - index, 1) if self._gap else 1
+                index, keyframe, self._gap = message.sequence, track is HEADER_TRACK, False
                 if stop is not None and number >= stop:
                     return
-            yield number, self._packet(track, message, keyframe)
+            last = self._packet(track, message, keyframe)
+            yield number, last
+        if self._chunks.cut_off:
+            self._warn_of_cut(last)
 
     def close(self) -> None:
         """Close the file if it was opened here."""
@@ -155,18 +182,47 @@ class McapReader:
         for chunk in self._rest:
             for position, (topic, message) in enumerate(chunk):
                 if topic == HEADER_TRACK.topic:
+                    self._limits.check("max_header_bytes", len(message.data), f"{self.name}: header bytes")
                     remaining: list[TopicMessage] = chunk[position:]
                     self._rest = chain([remaining], self._rest)
                     return message
         raise self._headless()
 
+    def _skip(self, error: StreamError) -> None:
+        self._gap = True
+        assert self._on_damage is not None
+        self._on_damage(error)
+
+    def _whole_sets(self, chunk: list[TopicMessage]) -> list[TopicMessage]:
+        """A chunk's messages, without those of a frame set that breaks off at its end."""
+        if not (self._chunks.partial and chunk):
+            return chunk
+        index = chunk[-1][1].sequence
+        there = {topic for topic, message in chunk if message.sequence == index}
+        if all(track.topic in there for track in self.header.tracks):
+            return chunk
+        return [(topic, message) for topic, message in chunk if message.sequence != index]
+
+    def _warn_of_cut(self, last: Packet | None) -> None:
+        if last is None:
+            raise self._cut_before()
+        text = f"{self.name}: cut off after {last.time_ns / 1e9:.3f} s; all before that is whole"
+        warnings.warn(text, MvCodecWarning, stacklevel=3)
+
+    def _cut_before(self) -> StreamError:
+        return StreamError(self.name, "a file cut off before its first frame set ended", EXPECTED)
+
     def _headless(self) -> StreamError:
+        if self._chunks.cut_off:
+            return self._cut_before()
         topics = ", ".join(sorted(self._chunks.topics)[:5]) or "none"
         return StreamError(self.name, f"MCAP without {HEADER_TRACK.topic} (topics: {topics})", EXPECTED)
 
     def _packet(self, track: Track, message: Message, keyframe: bool) -> Packet:
         data = message.data
-        if track is not HEADER_TRACK:
+        if track is HEADER_TRACK:
+            self._limits.check("max_header_bytes", len(data), f"{self.name}: header bytes")
+        else:
             source = f"{self.name}: {track.topic} at {message.log_time / 1e9:.3f} s"
             data = schemas.video_data(data, source, self.header.codec)
         return Packet(track, message.sequence, message.log_time, keyframe, data)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+import json
+import os
+import stat
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -14,16 +17,21 @@ from mcap.writer import CompressionType, Writer
 
 import mvcodec
 from mvcodec.container import schemas
-from mvcodec.errors import OutputError, StreamClosed
+from mvcodec.container.chunks import METADATA_NAME, TOPICS_KEY
+from mvcodec.errors import OutputError, SettingError, StreamClosed
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, TrackKind
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-CHUNK_NS = 500_000_000
-"""The most stream time that a chunk holds, hence what a power cut can lose."""
+CHUNK_MS = 500
+"""The most stream time that a chunk holds by default, hence what a power cut can lose."""
 
-METADATA_NAME = "mvcodec"
+MAX_CHUNK_MS = 60_000
+
+FULL_CHUNK_BYTES = 1 << 26
+"""A chunk ends when it holds so much, well below what readers take."""
+
 LIBRARY = f"mvcodec {mvcodec.__version__}"
 
 
@@ -32,20 +40,28 @@ class McapWriter:
 
     Args:
         target: path, or an open binary file, which may be a pipe and stays open.
+        chunk_ms: the most stream time that waits before it is written, 0..60000; with 0 each
+            frame set is written at once.
 
     Raises (from `push` and `close`):
+        SettingError (at once): chunk_ms is outside its range.
         OutputError: the system refuses to open or write.
     """
 
-    def __init__(self, target: BinaryIO | Path) -> None:
+    def __init__(self, target: BinaryIO | Path, chunk_ms: int = CHUNK_MS) -> None:
+        if not 0 <= chunk_ms <= MAX_CHUNK_MS:
+            raise SettingError("chunk_ms", chunk_ms, f"0..{MAX_CHUNK_MS} ms")
+        self._chunk_ns = chunk_ms * 1_000_000
         self._target = target
         self._name = str(target if isinstance(target, Path) else getattr(target, "name", "output"))
         self._file: io.BufferedWriter | None = None
         self._mcap: Writer | None = None
         self._channels: dict[str, int] = {}
         self._rig: tuple[schemas.RigMessage, ...] = ()
+        self._video_topics: tuple[str, ...] = ()
         self._codec = ""
         self._chunk_start_ns: int | None = None
+        self._chunk_bytes = 0
         self._closed = False
         self.frame_count = 0
 
@@ -62,6 +78,11 @@ class McapWriter:
             self._push(mcap, packets)
         except OSError as error:
             raise OutputError(self._name, error.strerror or error) from None
+
+    def note(self, name: str, values: Mapping[str, str]) -> None:
+        """Write a metadata record. Nothing is written where nothing was pushed."""
+        if self._mcap is not None:
+            self._mcap.add_metadata(name, dict(values))
 
     def close(self) -> None:
         """Complete the file with its summary. No file appears where nothing was pushed."""
@@ -93,10 +114,14 @@ class McapWriter:
         time_ns, keyframe = packets[0].time_ns, packets[0].track.kind is TrackKind.HEADER
         start = self._chunk_start_ns
         # A chunk starts at each keyframe, so that a reader reaches keyframes by the chunk index.
-        if start is not None and (keyframe or time_ns - start >= CHUNK_NS):
-            mcap.flush()  # type: ignore[no-untyped-call]
-            start = None
-        self._chunk_start_ns = time_ns if start is None else start
+        if start is not None and (
+            keyframe or time_ns - start >= self._chunk_ns or self._chunk_bytes >= FULL_CHUNK_BYTES
+        ):
+            self._end_chunk(mcap)
+        if self._chunk_start_ns is None:
+            self._chunk_start_ns = time_ns
+        if keyframe and self.frame_count and self._joinable:
+            mcap.add_metadata(METADATA_NAME, {TOPICS_KEY: self._topics()})
         for packet in packets:
             if packet.track.kind is TrackKind.HEADER:
                 self._add(mcap, packet.track.topic, packet, packet.data)
@@ -105,8 +130,31 @@ class McapWriter:
             else:
                 self._add(mcap, packet.track.topic, packet, schemas.video_message(packet, self._codec))
         self.frame_count += 1
+        if not self._chunk_ns:
+            self._end_chunk(mcap)
+
+    def _end_chunk(self, mcap: Writer) -> None:
+        """Write the chunk, and see that it outlasts a loss of power."""
+        mcap.flush()  # type: ignore[no-untyped-call]
+        self._chunk_start_ns, self._chunk_bytes = None, 0
+        if isinstance(self._target, Path) and self._file is not None:
+            descriptor = self._file.fileno()
+            if stat.S_ISREG(os.fstat(descriptor).st_mode):
+                os.fsync(descriptor)
+
+    @property
+    def _joinable(self) -> bool:
+        """Whether somebody may begin to read in the middle: of a pipe."""
+        return not isinstance(self._target, Path) and not self._target.seekable()
+
+    def _topics(self) -> str:
+        """Which topic each channel is, for readers that lack the first chunk, where channels are declared."""
+        tracks = {HEADER_TRACK.topic, *self._video_topics}
+        topics = {number: topic for topic, number in self._channels.items() if topic in tracks}
+        return json.dumps(topics, separators=(",", ":"))
 
     def _add(self, mcap: Writer, topic: str, packet: Packet, data: bytes) -> None:
+        self._chunk_bytes += len(data)
         mcap.add_message(self._channels[topic], packet.time_ns, data, packet.time_ns, sequence=packet.index)
 
     def _start(self, first: Packet) -> Writer:
@@ -117,11 +165,15 @@ class McapWriter:
         # Chunks end where `_push` says, never by size. Summary offsets are optional, and checkers
         # fault those of empty groups (a file without attachments).
         self._mcap = Writer(
-            self._file, chunk_size=1 << 62, compression=CompressionType.ZSTD, use_summary_offsets=False
+            self._file,
+            chunk_size=1 << 62,
+            compression=CompressionType.ZSTD,
+            use_summary_offsets=False,
+            enable_data_crcs=True,
         )
         self._mcap.start(profile="", library=LIBRARY)
-        self._mcap.add_metadata(METADATA_NAME, {"header": first.data.decode()})
         self._register(self._mcap, header)
+        self._mcap.add_metadata(METADATA_NAME, {"header": first.data.decode(), TOPICS_KEY: self._topics()})
         return self._mcap
 
     def _register(self, mcap: Writer, header: StreamHeader) -> None:
@@ -134,8 +186,9 @@ class McapWriter:
             kind: mcap.register_schema(name, SchemaEncoding.Protobuf, data)
             for kind, (name, data) in schemas.PROTOBUF_SCHEMAS.items()
         }
+        self._video_topics = tuple(track.topic for track in header.tracks)
         kinds = {message.topic: message.kind for message in self._rig}
-        kinds.update({track.topic: "video" for track in header.tracks})
+        kinds.update(dict.fromkeys(self._video_topics, "video"))
         for topic, kind in kinds.items():
             self._channels[topic] = mcap.register_channel(topic, MessageEncoding.Protobuf, ids[kind])
 

@@ -1,0 +1,236 @@
+"""MCAP records: the framing of a file, and the messages inside a chunk (https://mcap.dev/spec)."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Message
+
+from mvcodec.container.exact_file import ExactFile
+from mvcodec.container.limits import Limits
+from mvcodec.errors import MvCodecError
+
+MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
+
+HEAD = struct.Struct("<BQ")
+"""Opcode and length before a record's content."""
+
+_CHUNK_HEAD = struct.Struct("<QQQII")
+"""Start and end time, unpacked size, CRC, length of the name of the compression."""
+
+_MESSAGE_HEAD = struct.Struct("<HIQQ")
+"""Channel, sequence, log time, publish time."""
+
+_ZSTD = b"\x04\x00\x00\x00zstd"
+_ZSTD_AT = HEAD.size + _CHUNK_HEAD.size - 4
+_ZSTD_HEAD_BYTES = _CHUNK_HEAD.size + 4 + 8
+"""A zstd chunk's content before its data."""
+
+_SCAN_BYTES = 1 << 16
+
+_FIRST_RESERVED, _FIRST_PRIVATE = 0x10, 0x80
+"""Opcodes between these are reserved by the format: found, they are damage."""
+
+DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError, KeyError)
+"""What parsing raises on damaged bytes."""
+
+
+class RecordError(MvCodecError):
+    """A record that cannot be what it says. (Caught in this package, which knows time and topic.)"""
+
+
+class FramingError(RecordError):
+    """A record whose length is wrong, so that what follows it is not where it says."""
+
+
+class CutOff(MvCodecError):
+    """The input ends inside a record.
+
+    Attributes:
+        opcode: of that record; None where that was not read yet.
+        content: what is there of it.
+    """
+
+    def __init__(self, opcode: int | None = None, content: bytes = b"") -> None:
+        super().__init__("the input ends inside a record")
+        self.opcode, self.content = opcode, content
+
+
+def read_record(file: ExactFile, limits: Limits) -> tuple[int, bytes] | None:
+    """Opcode and content of the next record; an attachment's content is skipped (empty).
+
+    Returns:
+        None at the end of the input.
+
+    Raises:
+        RecordError: no record of MCAP begins here, or one beyond the limits.
+        CutOff: the input ends inside it.
+    """
+    head = file.read(HEAD.size)
+    if not head:
+        return None
+    if len(head) < HEAD.size:
+        raise CutOff
+    opcode, size = HEAD.unpack(head)
+    if not opcode or _FIRST_RESERVED <= opcode < _FIRST_PRIVATE:
+        file.give_back(head[1:])
+        raise RecordError(f"no record of kind {opcode}")
+    if opcode == Opcode.ATTACHMENT or opcode >= _FIRST_PRIVATE:
+        if not file.skip(size):
+            raise CutOff(opcode)
+        return opcode, b""
+    if size > limits.max_record_bytes:
+        file.give_back(head[1:])
+        raise RecordError(f"a record of {size} bytes, more than max_record_bytes = {limits.max_record_bytes}")
+    content = file.read(size)
+    if len(content) < size:
+        raise CutOff(opcode, content)
+    return opcode, content
+
+
+def find_chunk(file: ExactFile, limits: Limits) -> bool:
+    """Look for the start of the next zstd chunk and leave the input there; False where there is none."""
+    window = b""
+    while True:
+        piece = file.read(_SCAN_BYTES)
+        window += piece
+        at = window.find(_ZSTD)
+        while at >= 0:
+            start = at - _ZSTD_AT
+            if len(window) < at + len(_ZSTD) + 8 and piece:
+                break  # its length lies in the next piece
+            if start >= 0 and _is_chunk(window, start, limits):
+                file.give_back(window[start:])
+                return True
+            at = window.find(_ZSTD, at + 1)
+        if not piece:
+            return False
+        window = window[-(_ZSTD_AT + len(_ZSTD) + 8) :] if at < 0 else window[max(at - _ZSTD_AT, 0) :]
+
+
+def _is_chunk(window: bytes, start: int, limits: Limits) -> bool:
+    opcode, size = HEAD.unpack_from(window, start)
+    place = start + HEAD.size + _ZSTD_HEAD_BYTES
+    if opcode != Opcode.CHUNK or size > limits.max_record_bytes or place > len(window):
+        return False
+    return bool(struct.unpack_from("<Q", window, place - 8)[0] == size - _ZSTD_HEAD_BYTES)
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkHead:
+    """What a chunk says about itself before its data.
+
+    Attributes:
+        start_ns, end_ns: times of its first and last message.
+        size: unpacked, bytes.
+        crc: CRC-32 of the unpacked data; 0 where there is none.
+        compression: "" or "zstd".
+    """
+
+    start_ns: int
+    end_ns: int
+    size: int
+    crc: int
+    compression: str
+
+
+def parse_chunk(content: bytes, limits: Limits, *, whole: bool = True) -> tuple[ChunkHead, bytes]:
+    """Head and packed data of a chunk; with `whole` false, of one that breaks off.
+
+    Raises:
+        FramingError: its length is wrong.
+        RecordError: a chunk beyond the limits, or packed in a way that mvcodec doesn't know.
+    """
+    if len(content) < _CHUNK_HEAD.size:
+        raise RecordError("a chunk that ends too early")
+    start_ns, end_ns, size, crc, length = _CHUNK_HEAD.unpack_from(content)
+    name = content[_CHUNK_HEAD.size : _CHUNK_HEAD.size + length]
+    if name not in (b"", b"zstd"):
+        raise RecordError(f"chunks packed with {name[:20]!r}")
+    if size > limits.max_chunk_bytes:
+        raise RecordError(f"a chunk of {size} bytes, more than max_chunk_bytes = {limits.max_chunk_bytes}")
+    at = _CHUNK_HEAD.size + len(name)
+    data = content[at + 8 :]
+    if whole and content[at : at + 8] != struct.pack("<Q", len(data)):
+        raise FramingError("a chunk whose lengths disagree")
+    return ChunkHead(start_ns, end_ns, size, crc, name.decode()), data
+
+
+def unpack(head: ChunkHead, data: bytes, limits: Limits, *, whole: bool = True) -> bytes:
+    """The records of a chunk; with `whole` false, those of a chunk that breaks off.
+
+    Raises:
+        RecordError: the data are damaged, or larger than they say.
+    """
+    if head.compression == "zstd":
+        data = _decompress(data, head.size, limits, whole=whole)
+    if whole and len(data) != head.size:
+        raise RecordError(f"a chunk of {len(data)} bytes that announces {head.size}")
+    if whole and head.crc and zlib.crc32(data) != head.crc:
+        raise RecordError("a chunk whose checksum is wrong")
+    return data
+
+
+def _decompress(data: bytes, size: int, limits: Limits, *, whole: bool) -> bytes:
+    try:
+        announced = zstandard.frame_content_size(data) if whole else 0
+        if announced > limits.max_chunk_bytes:
+            raise RecordError(
+                f"a chunk of {announced} bytes, more than max_chunk_bytes = {limits.max_chunk_bytes}"
+            )
+        # The window is bounded too: it may be larger than what it unpacks to.
+        unpacker = zstandard.ZstdDecompressor(max_window_size=1 << 27)
+        with unpacker.stream_reader(io.BytesIO(data)) as stream:
+            return stream.read(size + 1)
+    except zstandard.ZstdError as error:
+        raise RecordError(f"a chunk that cannot be unpacked: {error}") from None
+
+
+def chunk_records(data: bytes, *, whole: bool = True) -> Iterator[Channel | Message]:
+    """The channels and messages of an unpacked chunk.
+
+    Raises:
+        RecordError: a record is damaged; with `whole` false, the end is only where it breaks off.
+    """
+    at = 0
+    while at < len(data):
+        if at + HEAD.size > len(data):
+            break
+        opcode, size = HEAD.unpack_from(data, at)
+        at += HEAD.size
+        if at + size > len(data):
+            break
+        if opcode == Opcode.CHANNEL:
+            yield parse_channel(data[at : at + size])
+        elif opcode == Opcode.MESSAGE:
+            yield parse_message(data[at : at + size])
+        at += size
+    else:
+        return
+    if whole:
+        raise RecordError("a chunk that ends inside a record")
+
+
+def parse_channel(content: bytes) -> Channel:
+    """A channel record."""
+    try:
+        channel: Channel = Channel.read(ReadDataStream(io.BytesIO(content)))
+    except DAMAGE as error:
+        raise RecordError(f"a damaged channel ({error})") from None
+    return channel
+
+
+def parse_message(content: bytes) -> Message:
+    """A message record."""
+    if len(content) < _MESSAGE_HEAD.size:
+        raise RecordError(f"a message of {len(content)} bytes")
+    channel, sequence, log_time, publish_time = _MESSAGE_HEAD.unpack_from(content)
+    return Message(channel, log_time, content[_MESSAGE_HEAD.size :], publish_time, sequence)
