@@ -74,7 +74,7 @@ class EncoderConfig:
     bitrate_kbps: float | None = None
     disparity_qp: int | None = None
     gop: int | None = None
-    matcher: str | Matcher = "sgbm"
+    matcher: str | Matcher = "joint"
     preset: str = "slow"
     disparity_range_px: tuple[float, float] | None = None
     codec: str = "h264"

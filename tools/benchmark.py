@@ -193,7 +193,7 @@ def main() -> int:
     parser.add_argument("--data", type=Path, metavar="DIR")
     parser.add_argument("--sets", type=lambda text: text.split(","), metavar="A,B")
     parser.add_argument("--what", choices=("quality", "speed"))
-    parser.add_argument("--matcher", default="sgbm")
+    parser.add_argument("--matcher", default="joint")
     parser.add_argument("--synthesizer", default="layered")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()

@@ -11,7 +11,7 @@ Mask = NDArray[np.bool_]
 
 
 @njit(cache=True, nogil=True)
-def consistent(  # noqa: PLR0917  (numba takes positions)
+def consistent(
     values: FloatMap, known: Mask, other: FloatMap, other_known: Mask, sign: int, tolerance: float
 ) -> Mask:
     """Where a map and that of its partner agree; see `mvcodec.stereo.consistency.left_right_check`."""

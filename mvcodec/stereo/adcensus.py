@@ -126,7 +126,7 @@ class _Direction:
     def __init__(
         self, first: Picture, second: Picture, low: int, count: int, settings: AdCensusSettings
     ) -> None:
-        from mvcodec.kernels import cost_volume as kernels  # noqa: PLC0415  (Numba is slow to import)
+        from mvcodec.kernels import cost_volume as kernels
 
         first, second = np.ascontiguousarray(first), np.ascontiguousarray(second)
         self._picture, self._low, self._settings = first, low, settings
@@ -147,7 +147,7 @@ class _Direction:
         Args:
             others: int32 (H, W), winners of the second picture.
         """
-        from mvcodec.kernels import disparity_repair as kernels  # noqa: PLC0415
+        from mvcodec.kernels import disparity_repair as kernels
 
         settings, count = self._settings, self.volume.shape[2]
         valid, hidden = self._check(others)
@@ -178,8 +178,8 @@ class _Direction:
 
 
 def _costs(first: Picture, second: Picture, low: int, count: int, settings: AdCensusSettings) -> _Volume:
-    from mvcodec.kernels.census import census_transform  # noqa: PLC0415
-    from mvcodec.kernels.cost_volume import ad_census_costs  # noqa: PLC0415
+    from mvcodec.kernels.census import census_transform
+    from mvcodec.kernels.cost_volume import ad_census_costs
 
     by_difference = _truncated(np.arange(3 * 255 + 1) / 3, settings.lambda_difference)
     by_distance = _truncated(np.arange(65), settings.lambda_census)
@@ -219,7 +219,7 @@ def _aggregate(costs: _Volume, spare: _Volume, arms: _Arms, rounds: int) -> None
 def _sum_region(
     volume: _Volume, spare: _Volume, arms: _Arms, divisor: NDArray[np.float32], rows_first: bool
 ) -> None:
-    from mvcodec.kernels.cost_volume import sum_along_columns, sum_along_rows  # noqa: PLC0415
+    from mvcodec.kernels.cost_volume import sum_along_columns, sum_along_rows
 
     height, width = volume.shape[:2]
     ones = np.ones((height, width), np.float32)
@@ -233,7 +233,7 @@ def _follow_scanlines(
     costs: _Volume, total: _Volume, pair: tuple[Picture, Picture], low: int, settings: AdCensusSettings
 ) -> None:
     """Section 2.3: `total` becomes the sum of the path costs from left, right, top and bottom."""
-    from mvcodec.kernels.cost_volume import follow_columns, follow_rows  # noqa: PLC0415
+    from mvcodec.kernels.cost_volume import follow_columns, follow_rows
 
     penalties = np.outer(_EDGE_SHARES, (settings.step_penalty, settings.jump_penalty)).astype(np.float32)
     total[:] = 0

@@ -39,7 +39,7 @@ def left_right_check(
     Returns:
         bool (H, W); False where unknown, contradicted, or seen outside the partner's picture.
     """
-    from mvcodec.kernels.matching_rows import consistent  # noqa: PLC0415  (Numba is slow to import)
+    from mvcodec.kernels.matching_rows import consistent
 
     sign = 1 if partner_is_right else -1
     kept: Mask = consistent(values_px, known, other_px, other_known, sign, tolerance_px)
@@ -60,7 +60,7 @@ def fill_from_farther(values_px: FloatMap, valid: Mask, fallback_px: float) -> F
     Returns:
         float32 (H, W), finite everywhere where the valid values are.
     """
-    from mvcodec.kernels.matching_rows import fill_rows  # noqa: PLC0415
+    from mvcodec.kernels.matching_rows import fill_rows
 
     rows = np.flatnonzero(valid.any(axis=1))
     if rows.size == 0:

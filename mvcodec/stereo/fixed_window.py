@@ -72,7 +72,7 @@ def ncc(left: Picture, right: Picture, window: int) -> Callable[[int], Costs]:
 
 def census(left: Picture, right: Picture, window: int) -> Callable[[int], Costs]:
     """Sum of Hamming distances (3.7) of 5 x 5 census transforms of luma."""
-    from mvcodec.kernels.census import census_transform  # noqa: PLC0415  (Numba is slow to import)
+    from mvcodec.kernels.census import census_transform
 
     first, second = (
         census_transform(

@@ -40,7 +40,7 @@ def fuse(
         raise ValueError(f"fuse: found {found}, expected at least one map and one weight for each")
     if len(candidates) == 1:
         return candidates[0]
-    from mvcodec.kernels.matching_rows import fuse_maps  # noqa: PLC0415  (Numba is slow to import)
+    from mvcodec.kernels.matching_rows import fuse_maps
 
     values = np.stack([candidate.values_px for candidate in candidates])
     valid = np.stack([candidate.valid for candidate in candidates])

@@ -7,11 +7,13 @@ from collections.abc import Callable
 from mvcodec.errors import SettingError
 from mvcodec.stereo.adcensus import AdCensus
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
+from mvcodec.stereo.joint import Joint
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stereo.pairwise import Pairwise
 from mvcodec.stereo.sgbm import Sgbm
 
 MATCHERS: dict[str, Callable[[], Matcher]] = {
+    "joint": Joint,
     "sgbm": lambda: Pairwise(Sgbm()),
     "sgbm-h": lambda: Pairwise(Sgbm(), vertical=False),
     "sad": lambda: Pairwise(FixedWindow()),

@@ -18,11 +18,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvcodec.array import CameraArray, Position, Viewpoint
+from mvcodec.array import CameraArray, Cell, Position, Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, FloatMap, Picture, RenderedView
 
 THREADS = 2
+FADE = 0.25
+"""Cells over which a camera fades out before a border that it does not stand on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +36,8 @@ class LayeredSettings:
         ratio: cameras behind a farther surface must weigh this many times those of a nearer one to
             outvote it, at least 1.
         reach_px: how far a moved pixel covers its surroundings, px, 0.5..1.
-        weight_power: a camera's bilinear weight is raised to this power; 0 = all alike.
+        spread: cells; a camera at distance b counts 1 / (spread + b^2), so that more cameras are
+            averaged (less noise, more blur) with a larger one, above 0.
         edge_trust: weight of pixels fetched at a camera's contours, 0..1.
         sharpness: Keys' parameter a of the cubic fetch, -1..0.
         hole_reach_px: how far holes are painted from, px, at least 1.
@@ -46,7 +49,7 @@ class LayeredSettings:
     tolerance_px: float = 1.5
     ratio: float = 1.3
     reach_px: float = 0.58
-    weight_power: float = 0.7
+    spread: float = 0.2
     edge_trust: float = 0.5
     sharpness: float = -0.65
     hole_reach_px: int = 64
@@ -56,7 +59,7 @@ class LayeredSettings:
             ("tolerance_px", 1e-3, 1e3),
             ("ratio", 1.0, 1e3),
             ("reach_px", 0.5, 1.0),
-            ("weight_power", 0.0, 10.0),
+            ("spread", 1e-3, 1e3),
             ("edge_trust", 0.0, 1.0),
             ("sharpness", -1.0, 0.0),
             ("hole_reach_px", 1, 4096),
@@ -101,7 +104,8 @@ class _Sources:
         split_luma(self.decoded.pictures[camera], self.lumas[place], self.colours[place])
         values = self.decoded.disparities[camera].values_px
         self.disparities[place] = values
-        crosses = _spread(values, 4) > 2 * tolerance_px
+        # The four pixels around the point must agree by themselves: one of them alone is asked below.
+        crosses = (_spread(values, 4) > 2 * tolerance_px) | (_spread(values, 2) > tolerance_px)
         self.fetchable[place] = cv2.copyMakeBorder(
             np.where(crosses, CONTOUR, values), *(BORDER,) * 4, cv2.BORDER_REPLICATE
         )
@@ -138,7 +142,7 @@ class Layered:
             pixels = decoded.pictures[position]
             own = decoded.disparities[position].values_px
             return RenderedView(viewpoint, pixels.copy(), own.copy(), np.ones(own.shape, np.uint8))
-        weights = {camera: self._weight(array, camera, viewpoint) for camera in cell.cameras}
+        weights = {camera: self._weight(array, cell, camera, viewpoint) for camera in cell.cameras}
         cameras = [camera for camera in cell.cameras if weights[camera] > 0 and camera in decoded.pictures]
         if not cameras:
             raise SettingError("decoded.pictures", "no camera of the view's cell", "at least one")
@@ -150,11 +154,24 @@ class Layered:
         pixels, seen_by = self._colour(sources, places, shifts, weight, disparity)
         return RenderedView(viewpoint, pixels, disparity, seen_by)
 
-    def _weight(self, array: CameraArray, camera: Position, viewpoint: Viewpoint) -> float:
-        """How much a camera of the cell counts: bilinear in its distance."""
-        across = 1 - abs(viewpoint.col - camera[1]) / array.col_step if array.col_step else 1.0
-        down = 1 - abs(viewpoint.row - camera[0]) / array.row_step if array.row_step else 1.0
-        return float((across * down) ** self.settings.weight_power) if across > 0 and down > 0 else 0.0
+    def _weight(self, array: CameraArray, cell: Cell, camera: Position, viewpoint: Viewpoint) -> float:
+        """How much a camera of the cell counts, by its distance.
+
+        Towards a border to another cell the cameras across this cell fade out, so that the picture
+        does not jump where other cameras take over.
+        """
+        across = abs(viewpoint.col - camera[1]) / array.col_step if array.col_step else 0.0
+        down = abs(viewpoint.row - camera[0]) / array.row_step if array.row_step else 0.0
+        weight = 1 / (self.settings.spread + across**2 + down**2)
+        if camera[1] == cell.left and cell.right < array.cols - 1:
+            weight *= min(1.0, (1 - across) / FADE)
+        if camera[1] == cell.right and cell.left > 0:
+            weight *= min(1.0, (1 - across) / FADE)
+        if camera[0] == cell.top and cell.bottom < array.rows - 1:
+            weight *= min(1.0, (1 - down) / FADE)
+        if camera[0] == cell.bottom and cell.top > 0:
+            weight *= min(1.0, (1 - down) / FADE)
+        return weight
 
     def _prepared(self, decoded: DecodedSet) -> _Sources:
         with self._lock:
