@@ -180,7 +180,12 @@ def planes_of(sources: list[twins.Source], tolerance: float) -> Planes:
     border = view_colour.BORDER
     split = [twins.split_luma(source.picture, border) for source in sources]
     fetchable = [
-        np.where(twins.spread(source.disparity, 1, 2) > 2 * tolerance, view_colour.CONTOUR, source.disparity)
+        np.where(
+            np.maximum(twins.spread(source.disparity, 1, 2) / 2, twins.spread(source.disparity, 0, 1))
+            > tolerance,
+            view_colour.CONTOUR,
+            source.disparity,
+        )
         for source in sources
     ]
     return (

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mvcodec.array import Viewpoint
+from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.frames import DecodedSet, FloatMap, Mask, Picture
-from mvcodec.synthesis.layered import LayeredSettings
+from mvcodec.synthesis.layered import FADE, LayeredSettings
 
 UNKNOWN = -1e9
 LUMA = np.array([0.299, 0.587, 0.114])
@@ -123,7 +123,7 @@ class Source:
             [max(0.0, 1 - abs(at_y - top - j)) for j in (-1, 0, 1, 2)],
             [max(0.0, 1 - abs(at_x - left - i)) for i in (-1, 0, 1, 2)],
         )
-        if depths.max() - depths.min() > 2 * settings.tolerance_px:
+        if max(np.ptp(depths) / 2, np.ptp(depths[1:3, 1:3])) > settings.tolerance_px:
             return self._at_contour(window, linear * (np.abs(depths - d) <= settings.tolerance_px), settings)
         if abs(self.disparity[top, left] - d) > settings.tolerance_px:
             return None
@@ -184,11 +184,12 @@ def blend(
         mixed, total = np.zeros(3), 0.0
         for k, (d, part) in enumerate(surfaces_around(view_disparity, x, y, settings.tolerance_px)):
             seen = [fetch for source in sources if (fetch := source.sees(x, y, d, settings)) is not None]
-            if seen:
+            if k == 0:
+                seen_by[y, x] = len(seen)
+            if seen and seen_by[y, x] > 0:
                 fetched = sum((weight * colour for weight, colour in seen), np.zeros(3))
                 mixed += part * fetched / sum(weight for weight, _ in seen)
                 total += part
-                seen_by[y, x] = len(seen) if k == 0 else max(int(seen_by[y, x]), 1)
         if total > 0:
             grey, red, blue = mixed / total
             green = grey - (LUMA[0] * red + LUMA[2] * blue) / LUMA[1]
@@ -223,6 +224,23 @@ def median3(disparity: FloatMap) -> FloatMap:
     return np.asarray(np.median(windows, axis=(2, 3)), np.float32)
 
 
+def camera_weight(
+    array: CameraArray, camera: Position, viewpoint: Viewpoint, settings: LayeredSettings
+) -> float:
+    """1 / (spread + squared distance in cells), less towards a border with a cell that lacks this camera."""
+    cell = array.cell_at(viewpoint)
+    down = abs(viewpoint.row - camera[0]) / (array.row_step or 1)
+    across = abs(viewpoint.col - camera[1]) / (array.col_step or 1)
+    weight = 1 / (settings.spread + across**2 + down**2)
+    for distance, place, first, last, end in (
+        (down, camera[0], cell.top, cell.bottom, array.rows - 1),
+        (across, camera[1], cell.left, cell.right, array.cols - 1),
+    ):
+        if (place == first and last < end) or (place == last and first > 0):
+            weight *= min(1, (1 - distance) / FADE)
+    return weight
+
+
 def render(
     decoded: DecodedSet, viewpoint: Viewpoint, settings: LayeredSettings
 ) -> tuple[NDArray[np.float64], FloatMap, NDArray[np.uint8], Mask]:
@@ -230,10 +248,8 @@ def render(
     array = decoded.array
     sources = []
     for camera in array.cell_at(viewpoint).cameras:
-        across = 1 - abs(viewpoint.col - camera[1]) / array.col_step if array.col_step else 1
-        down = 1 - abs(viewpoint.row - camera[0]) / array.row_step if array.row_step else 1
-        if across > 0 and down > 0:
-            weight = (across * down) ** settings.weight_power
+        weight = camera_weight(array, camera, viewpoint, settings)
+        if weight > 0:
             shift = array.shift_per_disparity(camera, viewpoint)
             disparity = decoded.disparities[camera].values_px
             sources.append(Source(decoded.pictures[camera], disparity, shift, weight))

@@ -179,16 +179,17 @@ def _blend_contour(  # type: ignore[no-untyped-def]
         weight, y_here, red_here, blue_here, seen = _see(
             x, y, surface[k], cameras, planes, shifts, weights, tolerance, edge_trust, sharpness
         )
+        if k == 0:
+            if weight == 0:  # with its neighbours' colour alone it would spread that into holes beside it
+                return False, grey, red, blue, 0
+            cameras_here = seen
         if weight > 0:
-            cameras_here = max(seen, 1) if k == 0 else max(cameras_here, 1)
             scale = part[k] / weight
             total += part[k]
             grey += scale * y_here
             red += scale * red_here
             blue += scale * blue_here
-    if total > 0:
-        return True, grey / total, red / total, blue / total, cameras_here
-    return False, grey, red, blue, 0
+    return True, grey / total, red / total, blue / total, cameras_here
 
 
 @njit(cache=True, nogil=True)
