@@ -71,6 +71,7 @@ class DecodedSet:
         pictures: uint8 (H, W, 3) RGB by real camera.
         disparities: by real camera.
         disparity_range_px: (lo, hi) that the maps can hold.
+        absent: real cameras that sent nothing usable; their pictures and maps are made from the others'.
     """
 
     array: CameraArray
@@ -79,6 +80,7 @@ class DecodedSet:
     pictures: Mapping[Position, Picture]
     disparities: Mapping[Position, DisparityMap]
     disparity_range_px: tuple[float, float]
+    absent: tuple[Position, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

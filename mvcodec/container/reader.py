@@ -89,6 +89,11 @@ class McapReader:
         return self._chunks.bytes_read
 
     @property
+    def cut_off(self) -> bool:
+        """Whether the input broke off, which is known when `packets` has ended."""
+        return self._chunks.cut_off
+
+    @property
     def size(self) -> int:
         """Bytes of the input: a file's size; of a pipe, what was read so far."""
         return self._chunks.size

@@ -202,16 +202,23 @@ class _Cursor:
         Raises:
             StreamError: it is damaged or missing.
         """
+        done: list[DecodedSet] = []
+        wanted = None
         for number, packet in self._packets:
             # A file without an index is read from its front; what lies before the keyframe is skipped.
             if number < self.next:
                 continue
+            if number == self.next:
+                wanted = packet.index
+            # A frame set that lacks a camera comes out with the first packet of the next.
             done = self._decoder.push(packet)
             if done:
-                if number != self.next:
-                    break
-                self.next += 1
-                return done[0]
+                break
+        else:
+            done = self._decoder.flush()
+        if done and done[0].index == wanted:
+            self.next += 1
+            return done[0]
         raise StreamError(self._reader.name, f"no frame set {self.next}", "one, as the index says")
 
     def close(self) -> None:

@@ -16,7 +16,10 @@ as long as x265's (960 x 640)."""
 
 _AT_ONCE = "pred-struct=1:lookahead=0"
 _REORDERED = "pred-struct=2"
-_ALWAYS = "scd=0:lp=1"
+
+# Keyframes come when the encoder asks for them (keyint=-1, scd=0); counting them as well, SVT-AV1
+# turns keyint=1 into another mode, with delay. One thread.
+_ALWAYS = "keyint=-1:scd=0:lp=1"
 
 SVT_PARAMS = {
     TrackKind.TEXTURE: "tune=1",
@@ -50,7 +53,7 @@ def av1_options(settings: VideoSettings) -> dict[str, str]:
     rate = settings.rate
     rate.check_scale(MAX_QP)
     delay = _AT_ONCE if settings.low_delay else _REORDERED
-    params = f"{delay}:{_ALWAYS}:keyint={settings.gop}:{SVT_PARAMS[settings.kind]}"
+    params = f"{delay}:{_ALWAYS}:{SVT_PARAMS[settings.kind]}"
     options = {"preset": str(SVT_PRESETS[settings.preset]), **rate.options()}
     if "b" in options:
         # Without delay SVT-AV1 knows constant bit rate only: maximum = average.

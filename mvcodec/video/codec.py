@@ -176,6 +176,14 @@ class DecoderFactory(Protocol):
         ...
 
 
+class Watch(Protocol):
+    """Looks at a track's access units before the decoder does."""
+
+    def push(self, data: bytes, label: str) -> None:
+        """Raise StreamError where the decoder would conceal damage or take too much memory."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Codec:
     """A stock video codec.
@@ -186,6 +194,7 @@ class Codec:
         settings: the codec's own settings for a kind of track, for the record in the header.
         options: all options that its encoder is given, by name.
         max_qp: the coarsest of its quantisers; the finest is 1.
+        watch: (width, height) -> what looks for damage that the decoder does not report; None if it does.
     """
 
     encoder: Callable[[VideoSettings], VideoEncoder]
@@ -193,3 +202,4 @@ class Codec:
     settings: Callable[[TrackKind], str]
     options: Callable[[VideoSettings], dict[str, str]]
     max_qp: int
+    watch: Callable[[tuple[int, int]], Watch] | None = None

@@ -19,6 +19,9 @@ from mvcodec.errors import SettingError, StreamError
 from mvcodec.stream import TrackKind
 from mvcodec.video.codec import CodedPicture, Plane, Planes, VideoSettings
 
+MAX_PIXELS = 1 << 26
+"""Decoders refuse larger pictures before they take memory: twice 8K."""
+
 
 class PyavEncoder:
     """Codes one track.
@@ -102,7 +105,7 @@ class PyavDecoder:
         context.thread_count = 1
         if low_delay:
             context.flags |= Flags.low_delay
-        context.options = {"err_detect": "explode"}
+        context.options = {"err_detect": "explode", "max_pixels": str(MAX_PIXELS)}
         self._context, self._expected, self._low_delay = context, expected, low_delay
 
     def push(self, data: bytes, label: str) -> list[Planes]:

@@ -5,9 +5,17 @@ from __future__ import annotations
 from mvcodec.errors import SettingError
 from mvcodec.video import av1, h264, hevc
 from mvcodec.video.codec import Codec
+from mvcodec.video.h264_syntax import ReferenceChain
 
 CODECS: dict[str, Codec] = {
-    "h264": Codec(h264.h264_encoder, h264.h264_decoder, h264.h264_settings, h264.h264_options, h264.MAX_QP),
+    "h264": Codec(
+        h264.h264_encoder,
+        h264.h264_decoder,
+        h264.h264_settings,
+        h264.h264_options,
+        h264.MAX_QP,
+        watch=ReferenceChain,
+    ),
     "hevc": Codec(hevc.hevc_encoder, hevc.hevc_decoder, hevc.hevc_settings, hevc.hevc_options, hevc.MAX_QP),
     "av1": Codec(av1.av1_encoder, av1.av1_decoder, av1.av1_settings, av1.av1_options, av1.MAX_QP),
 }

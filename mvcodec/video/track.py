@@ -1,0 +1,57 @@
+"""One track on its way back to pictures, with all checks that a stream from outside needs."""
+
+from __future__ import annotations
+
+from mvcodec.errors import MissingReference, StreamError
+from mvcodec.video.codec import Codec, Planes
+
+
+class TrackDecoder:
+    """Decodes one track: one access unit in, its picture out, or an error that says why not.
+
+    Args:
+        codec: of the track.
+        size: (width, height) of its pictures as coded.
+
+    Attributes:
+        lost: its next picture builds on one that never came or was damaged; a keyframe heals that.
+    """
+
+    def __init__(self, codec: Codec, size: tuple[int, int]) -> None:
+        self._codec, self._size = codec, size
+        self._decoder = codec.decoder()
+        self._watch = None if codec.watch is None else codec.watch(size)
+        self.lost = False
+
+    def push(self, data: bytes, keyframe: bool, label: str) -> Planes:
+        """Decode an access unit.
+
+        Args:
+            keyframe: it stands on its own.
+            label: what to call it in an error.
+
+        Raises:
+            MissingReference: it builds on a picture that is not there.
+            StreamError: it is damaged, or of another size.
+        """
+        if keyframe and self.lost:
+            self._decoder = self._codec.decoder()
+            self.lost = False
+        if self.lost:
+            raise MissingReference(label, "a picture that builds on one that is missing", "a keyframe")
+        try:
+            return self._decode(data, label)
+        except StreamError:
+            self.lost = True
+            raise
+
+    def _decode(self, data: bytes, label: str) -> Planes:
+        if self._watch is not None:
+            self._watch.push(data, label)
+        found = self._decoder.push(data, label)
+        if len(found) != 1:
+            raise StreamError(label, f"{len(found)} pictures in an access unit", "one")
+        height, width = found[0].y.shape
+        if (width, height) != self._size:
+            raise StreamError(label, f"a picture of {width}x{height}", f"{self._size[0]}x{self._size[1]}")
+        return found[0]
