@@ -58,7 +58,7 @@ class EncoderConfig:
         disparity_qp: constant quantiser of the maps, as qp; by default `default_disparity_qp`, or
             a DISPARITY_SHARE of the bit rate. Given, bitrate_kbps is that of the pictures alone.
         gop: frame sets from keyframe to keyframe, at most one second; by default one second.
-        matcher: name of a matcher, or one's own.
+        matcher: name of a matcher (``sad``), one with its refinement (``sad+dlr``), or one's own.
         preset: effort of the video encoder.
         disparity_range_px: (lo, hi) between neighbouring real cameras; by default estimated from
             the first frame set.
@@ -291,6 +291,6 @@ def _packet(track: Track, frames: FrameSet, coded: list[CodedPicture]) -> Packet
 def _matcher(matcher: str | Matcher) -> Matcher:
     if not isinstance(matcher, str):
         return matcher
-    from mvcodec.stereo.table import make_matcher
+    from mvcodec.layers.refinement import matcher_by_name
 
-    return make_matcher(matcher)
+    return matcher_by_name(matcher)

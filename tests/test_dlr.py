@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from stereo_scene import Planes, linear_or_grid
 
 from mvcodec.capture import open_input
+from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.kernels.growth import nearest_seeds
 from mvcodec.layers.dlr import DlrSettings, refine
-from mvcodec.layers.refinement import REFINEMENTS, refined
+from mvcodec.layers.refinement import matcher_by_name
 from mvcodec.layers.segments import split_picture
 from mvcodec.stereo.consistency import median
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
-from mvcodec.stereo.table import make_matcher
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 SIZES = [(9, 13), (1, 1), (1, 17), (6, 1), (4, 5)]
@@ -157,7 +157,7 @@ def test_invalid_pixels_have_no_say() -> None:
 def test_follows_any_matcher_of_any_array(grid: tuple[int, int]) -> None:
     array = linear_or_grid(*grid, 97, 81)
     pictures = Planes(array, 3, 9).pictures()
-    plain, after = (refined(make_matcher("sad"), name) for name in ("none", "dlr"))
+    plain, after = matcher_by_name("sad"), matcher_by_name("sad+dlr")
     range_px = (0.0, 14.0)
     maps = after.match(array, pictures, range_px)
     raw = plain.match(array, pictures, range_px)
@@ -173,7 +173,7 @@ def test_transposed_arrays_give_transposed_maps() -> None:
     pictures = Planes(row, 3, 9).pictures()
     turned = {(col, 0): pictures[0, col].transpose(1, 0, 2).copy() for _, col in pictures}
     along, down = (
-        refined(make_matcher("sad"), "dlr").match(array, views, (0.0, 14.0))
+        matcher_by_name("sad+dlr").match(array, views, (0.0, 14.0))
         for array, views in ((row, pictures), (column, turned))
     )
     for col in range(2):
@@ -181,9 +181,13 @@ def test_transposed_arrays_give_transposed_maps() -> None:
 
 
 def test_unknown_names_and_bad_settings_are_refused() -> None:
-    with pytest.raises(SettingError, match="refinement: found dle, expected one of none, dlr"):
-        refined(make_matcher("sad"), "dle")
-    assert list(REFINEMENTS) == ["none", "dlr"]
+    for name, expected in (
+        ("sad+dle", r"sad or sad\+dlr"),
+        ("sad+", r"sad or sad\+dlr"),
+        ("x+dlr", "one of .*sad"),
+    ):
+        with pytest.raises(SettingError, match=f"matcher: found .*, expected {expected}"):
+            matcher_by_name(name)
     for settings, text in (
         ({"jump_px": 0}, "jump_px: found 0"),
         ({"erosion_px": -1}, "erosion_px: found -1"),
@@ -192,6 +196,16 @@ def test_unknown_names_and_bad_settings_are_refused() -> None:
     ):
         with pytest.raises(SettingError, match=text):
             DlrSettings(**settings)
+
+
+def test_the_encoder_takes_a_refined_matcher_by_name() -> None:
+    array = linear_or_grid(1, 2, 64, 48)
+    config = EncoderConfig(matcher="sad+dlr", disparity_range_px=(0.0, 14.0), preset="veryfast")
+    with Encoder(array, config) as encoder:
+        header, *_ = encoder.push(Planes(array, 3, 9).frame_set())
+    assert b'"matcher":"sad+dlr"' in header.data.replace(b" ", b"")
+    with pytest.raises(SettingError, match=r"matcher: found sad\+x"):
+        Encoder(array, EncoderConfig(matcher="sad+x"))
 
 
 @pytest.mark.shared_data

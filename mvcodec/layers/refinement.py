@@ -15,6 +15,7 @@ from mvcodec.frames import DisparityMap, Picture
 from mvcodec.layers.dlr import DlrSettings, refine
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stereo.pairwise import transposed
+from mvcodec.stereo.table import make_matcher
 
 _Pixel = TypeVar("_Pixel", bound=np.generic)
 
@@ -53,18 +54,23 @@ def _turned(plane: NDArray[_Pixel]) -> NDArray[_Pixel]:
     return np.ascontiguousarray(plane.T)
 
 
-REFINEMENTS: dict[str, Callable[[Matcher], Matcher]] = {
-    "none": lambda matcher: matcher,
-    "dlr": Dlr,
-}
+REFINEMENTS: dict[str, Callable[[Matcher], Matcher]] = {"dlr": Dlr}
+
+SEPARATOR = "+"
+"""Between the name of a matcher and that of the refinement that follows it: ``sad+dlr``."""
 
 
-def refined(matcher: Matcher, name: str) -> Matcher:
-    """The matcher followed by the refinement of this name.
+def matcher_by_name(name: str) -> Matcher:
+    """The matcher of this name, one of MATCHERS, refined where that of a refinement follows: ``sad+dlr``.
 
     Raises:
         SettingError: there is none; the message names the choices.
     """
-    if name not in REFINEMENTS:
-        raise SettingError("refinement", name, "one of " + ", ".join(REFINEMENTS))
-    return REFINEMENTS[name](matcher)
+    base, separator, refinement = name.partition(SEPARATOR)
+    matcher = make_matcher(base)
+    if not separator:
+        return matcher
+    if refinement not in REFINEMENTS:
+        choices = " or ".join(f"{base}{SEPARATOR}{known}" for known in REFINEMENTS)
+        raise SettingError("matcher", name, f"{base} or {choices}")
+    return REFINEMENTS[refinement](matcher)
