@@ -25,7 +25,7 @@ def census_transform(grey: NDArray[np.uint8], radius_x: int, radius_y: int) -> N
     return bits
 
 
-def ad_census_costs(  # noqa: PLR0917 - called as the compiled one is
+def ad_census_costs(
     first: Picture,
     second: Picture,
     first_census: NDArray[np.uint64],
@@ -71,7 +71,7 @@ def sums(volume: Volume, arms: Arms, counts: NDArray[np.float32], along_rows: bo
     return result
 
 
-def follow(  # noqa: PLR0917
+def follow(
     volume: Volume,
     first_edges: Mask,
     second_edges: Mask,
