@@ -21,6 +21,8 @@ Position = tuple[int, int]
 NOMINAL_BASELINE_M = 0.1
 MAX_GRID_SIDE = 1024
 MAX_PICTURE_SIDE = 16384
+LISTED_SIDE = 32
+"""Up to here a message lists rows (columns) one by one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,8 +225,8 @@ class CameraArray:
         b_row = (viewpoint.row - camera[0]) / self.row_step if self.row_step else 0.0
         return b_col, self.cell_rho * b_row
 
-    def camera_position_m(self, position: Position) -> tuple[float, float, float]:
-        """Where a view stands in optical axes (x right, y down, z forward), metres."""
+    def camera_position_m(self, position: tuple[float, float]) -> tuple[float, float, float]:
+        """Where a view stands in optical axes (x right, y down, z forward), metres; fractions are legal."""
         row, col = position
         calibration = self.calibration
         vertical = self.rho * calibration.fx_px / calibration.fy_px
@@ -255,10 +257,14 @@ def _check_real(axis: str, real: tuple[int, ...], count: int) -> None:
     steps = {b - a for a, b in pairwise(real)}
     ends_match = bool(real) and real[0] == 0 and real[-1] == count - 1
     if not ends_match or len(steps) > 1 or any(step <= 0 for step in steps):
-        legal = " or ".join(",".join(str(i) for i in range(0, count, step)) for step in legal_steps(count))
+        spacings = [range(0, count, step) for step in legal_steps(count)]
+        legal = " or ".join(
+            ",".join(map(str, places)) if count <= LISTED_SIDE else f"every {places.step}"
+            for places in spacings
+        )
         raise SettingError(
             f"real {axis}",
-            ",".join(map(str, real)) or "none",
+            ",".join(map(str, real[:LISTED_SIDE])) or "none",
             f"equally spaced {axis} from first to last: {legal}",
         )
 

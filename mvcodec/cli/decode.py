@@ -4,39 +4,51 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 from mvcodec.array import Viewpoint
 from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes, view
+from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.progress import progress
+from mvcodec.cli.safety import add_limits, add_on_error
+from mvcodec.cli.standard_streams import STANDARD, standard_output
 from mvcodec.container import McapReader
+from mvcodec.container.chunked_file import CHUNK_MS
+from mvcodec.container.follow import FollowedFile
+from mvcodec.container.limits import Limits
 from mvcodec.decoder import Decoder
-from mvcodec.errors import OutputError, SettingError
+from mvcodec.errors import OutputError, SettingError, StreamError
 from mvcodec.frames import DecodedSet, Picture
-from mvcodec.output.forms import FORMS, OutputPlan, ViewWriter, open_form
+from mvcodec.output.forms import FORMS, OutputPlan, open_form
+from mvcodec.output.mcap_views import McapViews
 from mvcodec.stream import StreamHeader
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
 
-STANDARD_INPUT = "-"
 DEFAULT_SYNTHESIZER = "layered"
 MOSAIC = "mosaic"
 MOSAIC_SUFFIXES = (".mp4", ".png")
+MCAP = "mcap"
 THREADS = 2
+
+Sink = Callable[[DecodedSet, list[Picture]], None]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``decode``."""
     parser.add_argument("input", metavar="IN.mcap", help="or - for standard input")
     parser.add_argument(
-        "output", type=Path, metavar="OUT", help="a folder; for --format mosaic a .mp4 or .png file"
+        "output",
+        type=Path,
+        metavar="OUT",
+        help="a folder; for --format mosaic a .mp4 or .png file; for --format mcap a .mcap file or -",
     )
-    parser.add_argument("--format", choices=FORMS, help="default: array, or png with --view")
+    parser.add_argument("--format", choices=(*FORMS, MCAP), help="default: array, or png with --view")
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
         "--grid",
@@ -57,7 +69,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
     )
+    parser.add_argument(
+        "--follow", action="store_true", help="wait for more where the file ends, until it is complete"
+    )
     add_frames(parser, "frames of the file to decode")
+    add_on_error(parser, "stop")
+    add_limits(parser)
     add_output_options(parser)
 
 
@@ -67,40 +84,75 @@ def run(arguments: argparse.Namespace) -> None:
     form = arguments.format or ("png" if arguments.view else "array")
     if form == "array" and arguments.view:
         raise SettingError("--view", "single views", "--grid RxC for --format array, which holds a grid")
-    source: Path | BinaryIO = sys.stdin.buffer
-    if arguments.input != STANDARD_INPUT:
-        source = Path(arguments.input)
-        if source.resolve() == arguments.output.resolve():
-            raise SettingError("OUT", arguments.output, "another file than IN.mcap")
-    _check_output(form, arguments.output)
+    _check_output(form, arguments)
+    limits = Limits(**dict(arguments.limit))
+    damage: StreamError | None = None
     with (
-        Decoder.open(source, arguments.frames) as decoder,
+        _source(arguments) as source,
+        Decoder.open(source, arguments.frames, arguments.on_error, limits) as decoder,
         ThreadPoolExecutor(THREADS, "render") as pool,
         progress("decode", _frame_total(source, arguments.frames), quiet=arguments.quiet) as bar,
         ExitStack() as outputs,
     ):
         plan = _plan(decoder.header, arguments)
-        writer: ViewWriter | None = None
-        for decoded in decoder:
-            if writer is None:
-                plan = replace(plan, first_frame=decoded.index)
-                writer = outputs.enter_context(open_form(form, arguments.output, plan))
-            writer.push(_render(synthesizer, decoded, plan.viewpoints, pool))
-            bar.update()
-            if form == MOSAIC and arguments.output.suffix.lower() == ".png":
-                break  # one picture holds one frame set
+        sink: Sink | None = None
+        try:
+            for decoded in decoder:
+                pictures = _render(synthesizer, decoded, plan.viewpoints, pool)
+                if sink is None:
+                    plan = replace(plan, first_frame=decoded.index)
+                    sink = _open_sink(form, arguments.output, plan, outputs)
+                sink(decoded, pictures)
+                bar.update()
+                if form == MOSAIC and arguments.output.suffix.lower() == ".png":
+                    break  # one picture holds one frame set
+        except StreamError as error:
+            damage = error  # the outputs are completed first, so that what was decoded stays
+    if damage is not None:
+        raise damage
 
 
-def _check_output(form: str, path: Path) -> None:
+@contextmanager
+def _source(arguments: argparse.Namespace) -> Iterator[Path | BinaryIO]:
+    """The input. With --follow, Ctrl-C ends it, as its end does."""
+    if arguments.input == STANDARD:
+        yield sys.stdin.buffer
+    elif arguments.follow:
+        with deferred_interrupt() as interrupted, FollowedFile(Path(arguments.input), interrupted) as file:
+            yield cast("BinaryIO", file)
+    else:
+        yield Path(arguments.input)
+
+
+def _check_output(form: str, arguments: argparse.Namespace) -> None:
     """Refuse what cannot be written before any work is done."""
-    if form != MOSAIC:
+    path: Path = arguments.output
+    if arguments.input != STANDARD and Path(arguments.input).resolve() == path.resolve():
+        raise SettingError("OUT", path, "another file than IN.mcap")
+    if form not in (MOSAIC, MCAP):
+        if str(path) == STANDARD:
+            raise SettingError("OUT", path, f"a folder, or --format {MCAP} for standard output")
         if path.exists() and not path.is_dir():
             raise OutputError(path, f"it is a file, --format {form} needs a folder")
-    elif path.suffix.lower() not in MOSAIC_SUFFIXES:
-        expected = f"a name that ends in {' or '.join(MOSAIC_SUFFIXES)} for --format {MOSAIC}"
+        return
+    suffixes = MOSAIC_SUFFIXES if form == MOSAIC else (".mcap",)
+    if path.suffix.lower() not in suffixes and not (form == MCAP and str(path) == STANDARD):
+        expected = f"a name that ends in {' or '.join(suffixes)} for --format {form}"
         raise SettingError("OUT", path, expected)
-    elif path.is_dir():
-        raise OutputError(path, f"it is a folder, --format {MOSAIC} needs a file")
+    if path.is_dir():
+        raise OutputError(path, f"it is a folder, --format {form} needs a file")
+
+
+def _open_sink(form: str, target: Path, plan: OutputPlan, outputs: ExitStack) -> Sink:
+    """What takes the pictures of each frame set; `outputs` completes it."""
+    if form == MCAP:
+        live = str(target) == STANDARD
+        views = outputs.enter_context(
+            McapViews(standard_output() if live else target, plan, 0 if live else CHUNK_MS)
+        )
+        return lambda decoded, pictures: views.push(pictures, decoded.index, decoded.time_ns)
+    writer = outputs.enter_context(open_form(form, target, plan))
+    return lambda _, pictures: writer.push(pictures)
 
 
 def _render(

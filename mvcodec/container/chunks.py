@@ -211,7 +211,8 @@ class ChunkReader:
             elif opcode == Opcode.MESSAGE:
                 message = parse_message(content)
                 self._last_time_ns = message.log_time
-                return [(self._topic(message), message)]
+                topic = self._topic(message)
+                return [(topic, message)] if topic else []
         except RecordError as error:
             self._report(str(error))
         return []
@@ -235,16 +236,17 @@ class ChunkReader:
         for item in chunk_records(data, whole=whole):
             if isinstance(item, Channel):
                 self._channels[item.id] = item
-            else:
-                messages.append((self._topic(item), item))
+            elif topic := self._topic(item):
+                messages.append((topic, item))
         if messages:
             self._last_time_ns = messages[-1][1].log_time
         return messages
 
-    def _topic(self, message: Message) -> str:
+    def _topic(self, message: Message) -> str | None:
+        """A message's topic; None where channels were lost and this one is not among those said twice."""
         channel = self._channels.get(message.channel_id)
         topic = self._fallback.get(message.channel_id) if channel is None else channel.topic
-        if topic is None:
+        if topic is None and not self._fallback:
             raise RecordError(f"a message of unknown channel {message.channel_id}")
         return topic
 

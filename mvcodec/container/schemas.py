@@ -13,7 +13,7 @@ from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from google.protobuf.message import DecodeError
 from mcap_protobuf.schema import build_file_descriptor_set
 
-from mvcodec.array import CameraArray, Position
+from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.errors import StreamError
 from mvcodec.stream import Packet, view_name
 
@@ -80,22 +80,38 @@ def frame_id(camera: Position) -> str:
 
 def rig_messages(array: CameraArray) -> tuple[RigMessage, ...]:
     """Calibration and place of every real camera."""
-    messages = []
-    for camera in array.real:
-        calibration = _calibration(array, camera)
-        messages.append(RigMessage(f"/camera/{view_name(camera)}/calibration", "calibration", calibration))
-        messages.append(RigMessage(TRANSFORM_TOPIC, "transform", _transform(array, camera)))
-    return tuple(messages)
+    places = {camera: Viewpoint(*camera) for camera in array.real}
+    return tuple(
+        message
+        for camera, place in places.items()
+        for message in place_messages(
+            array, place, f"/camera/{view_name(camera)}/calibration", frame_id(camera)
+        )
+    )
+
+
+def place_messages(
+    array: CameraArray, place: Viewpoint, topic: str, frame: str
+) -> tuple[RigMessage, RigMessage]:
+    """Calibration (on a topic) and place of whatever sees from a viewpoint of the array."""
+    return (
+        RigMessage(topic, "calibration", _calibration(array, frame)),
+        RigMessage(TRANSFORM_TOPIC, "transform", _transform(array, place, frame)),
+    )
 
 
 def video_message(packet: Packet, codec: str) -> bytes:
     """A serialised foxglove.CompressedVideo of a packet."""
     assert packet.track.camera is not None
-    name = VIDEO_FORMATS.get(codec, codec)
-    message = CompressedVideo(frame_id=frame_id(packet.track.camera), data=packet.data, format=name)
-    message.timestamp.FromNanoseconds(packet.time_ns)
-    data: bytes = message.SerializeToString()
-    return data
+    return compressed_video(frame_id(packet.track.camera), packet.time_ns, packet.data, codec)
+
+
+def compressed_video(frame: str, time_ns: int, data: bytes, codec: str) -> bytes:
+    """A serialised foxglove.CompressedVideo."""
+    message = CompressedVideo(frame_id=frame, data=data, format=VIDEO_FORMATS.get(codec, codec))
+    message.timestamp.FromNanoseconds(time_ns)
+    serialised: bytes = message.SerializeToString()
+    return serialised
 
 
 def video_data(message: bytes, source: str, codec: str) -> bytes:
@@ -115,10 +131,10 @@ def video_data(message: bytes, source: str, codec: str) -> bytes:
     return data
 
 
-def _calibration(array: CameraArray, camera: Position) -> Callable[[int], bytes]:
+def _calibration(array: CameraArray, frame: str) -> Callable[[int], bytes]:
     c = array.calibration
     message = CameraCalibration(
-        frame_id=frame_id(camera),
+        frame_id=frame,
         width=array.width,
         height=array.height,
         distortion_model="plumb_bob",
@@ -130,9 +146,9 @@ def _calibration(array: CameraArray, camera: Position) -> Callable[[int], bytes]
     return _stamped(message)
 
 
-def _transform(array: CameraArray, camera: Position) -> Callable[[int], bytes]:
-    right, down, forward = array.camera_position_m(camera)
-    message = FrameTransform(parent_frame_id=RIG_FRAME, child_frame_id=frame_id(camera))
+def _transform(array: CameraArray, place: Viewpoint, frame: str) -> Callable[[int], bytes]:
+    right, down, forward = array.camera_position_m((place.row, place.col))
+    message = FrameTransform(parent_frame_id=RIG_FRAME, child_frame_id=frame)
     message.translation.x, message.translation.y, message.translation.z = forward, -right, -down
     rotation = message.rotation
     rotation.x, rotation.y, rotation.z, rotation.w = OPTICAL_TO_RIG
