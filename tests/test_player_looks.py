@@ -11,7 +11,8 @@ from plane_scene import Plane, PlaneScene, grid
 
 from mvcodec.array import Viewpoint
 from mvcodec.frames import DecodedSet, Picture, RenderedView
-from mvcodec.player import overlays, stereo
+from mvcodec.output import stereo
+from mvcodec.player import overlays
 from mvcodec.player.looks import LOOKS
 from mvcodec.synthesis.linear import Linear
 

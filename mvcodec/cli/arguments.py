@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Sequence
 
-NEGATIVE_VALUES = ("--disparity-range", "--frames", "--view")
+NEGATIVE_VALUES = ("--disparity-range", "--frames", "--refocus", "--view")
 """Options whose value may begin with a minus sign."""
 
 

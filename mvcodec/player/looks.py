@@ -13,7 +13,8 @@ import numpy as np
 
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.frames import DecodedSet, Picture, RenderedView
-from mvcodec.player import overlays, stereo
+from mvcodec.output import stereo
+from mvcodec.player import overlays
 
 Legend = dict[str, Any]
 """Plain JSON values; see `overlays`."""
@@ -47,15 +48,25 @@ def _plain(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture
 
 
 def _anaglyph(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, Legend]:
-    return stereo.anaglyph(views[0].pixels, views[1].pixels), stereo.legend(views)
+    return stereo.anaglyph(views[0].pixels, views[1].pixels), _eyes(views)
 
 
 def _side_by_side(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, Legend]:
-    return np.hstack([view.pixels for view in views]), stereo.legend(views)
+    return np.hstack([view.pixels for view in views]), _eyes(views)
 
 
 def _mosaic(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, Legend]:
-    return stereo.nine([view.pixels for view in views]), stereo.legend(views)
+    return stereo.nine([view.pixels for view in views]), _eyes(views)
+
+
+def _eyes(views: Sequence[RenderedView]) -> Legend:
+    """Where the eyes are, in words."""
+    first, last = views[0].viewpoint.col, views[-1].viewpoint.col
+    if first == last:
+        return {"kind": "text", "text": "No distance between the eyes: this array has one column, or it is 0"}
+    between = (last - first) / (len(views) - 1)
+    what = "Left and right eye" if len(views) == 2 else f"{len(views)} views"
+    return {"kind": "text", "text": f"{what} at columns {first:.2f} to {last:.2f}, {between:.2f} apart"}
 
 
 LOOKS: dict[str, Look] = {

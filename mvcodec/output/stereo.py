@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import cv2
 import numpy as np
 
 from mvcodec.array import CameraArray, Viewpoint
-from mvcodec.frames import Picture, RenderedView
+from mvcodec.frames import Picture
 from mvcodec.output.mosaic import mosaic
 
 NINE = 9
@@ -57,13 +56,3 @@ def anaglyph(left: Picture, right: Picture) -> Picture:
 def nine(pictures: Sequence[Picture]) -> Picture:
     """Nine pictures as lenticular displays take them: three rows of three, the leftmost view first."""
     return mosaic([pictures[row * 3 : row * 3 + 3] for row in range(3)], NINE_SIZE)
-
-
-def legend(views: Sequence[RenderedView]) -> dict[str, Any]:
-    """Where the eyes are, in words."""
-    first, last = views[0].viewpoint.col, views[-1].viewpoint.col
-    if first == last:
-        return {"kind": "text", "text": "No distance between the eyes: this array has one column, or it is 0"}
-    between = (last - first) / (len(views) - 1)
-    what = "Left and right eye" if len(views) == 2 else f"{len(views)} views"
-    return {"kind": "text", "text": f"{what} at columns {first:.2f} to {last:.2f}, {between:.2f} apart"}

@@ -1,0 +1,150 @@
+"""``mvcodec render``: pictures to take away: paths of the viewpoint, stereo, quilts, refocus."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterator
+from itertools import chain, repeat
+from pathlib import Path
+
+from tqdm import tqdm
+
+from mvcodec.array import CameraArray, Viewpoint
+from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes, view
+from mvcodec.cli.decode import DEFAULT_SYNTHESIZER
+from mvcodec.cli.progress import progress
+from mvcodec.container import McapReader, read_info
+from mvcodec.decoder import Decoder
+from mvcodec.errors import OutputError, SettingError, StreamError
+from mvcodec.frames import Picture
+from mvcodec.output.light_field import quilt_path
+from mvcodec.output.picture_file import STILL_SUFFIX, WRITERS, find_writer
+from mvcodec.output.styles import STYLES, ShotSettings, take
+from mvcodec.output.view_path import FILE_SUFFIX, SHAPES, read_waypoints, walk_shape, walk_waypoints
+from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
+
+QUILT = "quilt"
+FROZEN_SECONDS = 3
+"""How long a path takes while time stands."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``render``."""
+    parser.add_argument("input", type=Path, metavar="FILE.mcap")
+    parser.add_argument(
+        "output",
+        type=Path,
+        metavar="OUT",
+        help=f"a file *{', *'.join(WRITERS)}; {STILL_SUFFIX} holds the first picture",
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--path",
+        metavar="PATH",
+        help=f"way of the viewpoint: {', '.join(SHAPES)}, or a file *{FILE_SUFFIX} with "
+        '{"viewpoints": [[row, col], ...]}; of a single frame time stands meanwhile',
+    )
+    where.add_argument(
+        "--view",
+        type=view,
+        metavar="ROW,COL",
+        help="viewpoint, in steps of the input's grid (default: middle)",
+    )
+    parser.add_argument("--style", choices=STYLES, default="mono", help="default: %(default)s")
+    parser.add_argument(
+        "--refocus",
+        type=_pixels,
+        metavar="PX",
+        help="disparity in focus, px for one step of the input's grid: the others blur; "
+        "with another style than mono it comes to lie in the plane of the screen",
+    )
+    parser.add_argument(
+        "--grid",
+        type=pair_of_sizes,
+        metavar="RxC",
+        help="views of a mosaic, quilt or refocused picture; 1xN: of an epipolar slice",
+    )
+    parser.add_argument(
+        "--synthesizer",
+        default=DEFAULT_SYNTHESIZER,
+        metavar="NAME",
+        help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
+    )
+    add_frames(parser, "frames of the file")
+    add_output_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Decode, render, compose and write; tell the name where it is another than OUT."""
+    synthesizer = make_synthesizer(arguments.synthesizer)
+    write = find_writer(arguments.output)
+    _check_settings(arguments)
+    with Decoder.open(arguments.input, arguments.frames) as decoder:
+        array, count = decoder.header.array, _frame_count(arguments.input, arguments.frames)
+        places = _places(arguments, array, count)
+        sets = iter(decoder)
+        first = next(sets, None)
+        if first is None:
+            raise StreamError(arguments.input, "no frame set", "one at least")
+        shot = STYLES[arguments.style](ShotSettings.of(first, arguments.grid, arguments.refocus))
+        if arguments.path is not None and not shot.moves:
+            raise SettingError("--path", arguments.path, "none for a picture of the whole array")
+        output = arguments.output
+        if arguments.style == QUILT and shot.grid is not None:
+            output = quilt_path(output, *shot.grid, array.width / array.height)
+        times = repeat(first) if count == 1 else chain([first], sets)
+        moments = ((decoded, place) for place, decoded in zip(places, times, strict=False))
+        with progress("render", len(places), quiet=arguments.quiet, unit="picture") as bar:
+            write(output, _counted(take(shot, moments, synthesizer), bar), array.fps)
+    if output != arguments.output and not arguments.quiet:
+        print(output)
+
+
+def _check_settings(arguments: argparse.Namespace) -> None:
+    """Refuse what cannot be done before any work is."""
+    output = arguments.output
+    if arguments.input.resolve() == output.resolve():
+        raise SettingError("OUT", output, "another file than FILE.mcap")
+    if output.is_dir():
+        raise OutputError(output, "it is a folder")
+    if arguments.path is not None and output.suffix.lower() == STILL_SUFFIX:
+        raise SettingError("--path", arguments.path, f"none for {output.name}, which holds one picture")
+
+
+def _places(arguments: argparse.Namespace, array: CameraArray, count: int) -> tuple[Viewpoint, ...]:
+    """The viewpoint of each picture to be made of `count` frame sets."""
+    if arguments.path is None:
+        row, col = arguments.view or ((array.rows - 1) / 2, (array.cols - 1) / 2)
+        array.check_viewpoint(Viewpoint(row, col))
+        return (Viewpoint(row, col),) * (1 if arguments.output.suffix.lower() == STILL_SUFFIX else count)
+    if count == 1:
+        count = max(2, round(FROZEN_SECONDS * array.fps))
+    if arguments.path.lower().endswith(FILE_SUFFIX):
+        return walk_waypoints(read_waypoints(Path(arguments.path), array), count)
+    return walk_shape(arguments.path, array, count)
+
+
+def _frame_count(path: Path, frames: slice | None) -> int:
+    """How many frame sets are selected; 0 where the decoder will refuse them."""
+    with McapReader.open(path) as reader:
+        count = reader.frame_count
+    if count is None:  # cut short: counted by reading it
+        count = read_info(path).frames
+    return len(range(*(frames or slice(None)).indices(count)))
+
+
+def _counted(pictures: Iterator[Picture], bar: tqdm[None]) -> Iterator[Picture]:
+    for picture in pictures:
+        yield picture
+        bar.update()
+
+
+def _pixels(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a number of px")
+    return number
