@@ -19,6 +19,7 @@ COMMANDS: dict[str, str] = {
     "encode": "code an array of pictures or videos into one MCAP file",
     "decode": "decode a file and synthesise views from it",
     "play": "watch a file in the browser, from any viewpoint",
+    "render": "make pictures to take away: paths of the viewpoint, stereo, quilts, refocus",
     "info": "say what a file holds",
     "compare": "measure a decoded array against its original",
 }
