@@ -15,6 +15,7 @@ from mvcodec.cli.arguments import add_frames, add_output_options, disparity_rang
 from mvcodec.cli.info import document, summary
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.progress import progress
+from mvcodec.cli.safety import add_chunk_ms
 from mvcodec.container import McapWriter, read_info
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
@@ -98,6 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="px between neighbouring real cameras; auto: estimated whatever the input states"
         " (default: estimated within what it states)",
     )
+    add_chunk_ms(parser)
     add_frames(parser, "frames of the input to code")
     add_output_options(parser, "print what the file holds as JSON")
 
@@ -113,7 +115,7 @@ def run(arguments: argparse.Namespace) -> None:
             f"{source.name}: no calibration given; nominal values stand in (f = picture width, 0.1 m a step)"
         )
         warnings.warn(text, MvCodecWarning, stacklevel=2)
-    range_px = _find_range(source, chosen, arguments.disparity_range)
+    range_px = find_range(source, chosen, arguments.disparity_range)
     _encode(source, chosen, replace(config, disparity_range_px=range_px), arguments)
     info = read_info(arguments.output)
     if arguments.json:
@@ -123,7 +125,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def _encode(source: ArraySource, chosen: range, config: EncoderConfig, arguments: argparse.Namespace) -> None:
-    writer = McapWriter(arguments.output)
+    writer = McapWriter(arguments.output, arguments.chunk_ms)
     try:
         with (
             deferred_interrupt() as interrupted,
@@ -177,9 +179,10 @@ def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
     return config
 
 
-def _find_range(
+def find_range(
     source: ArraySource, chosen: range, option: tuple[float, float] | str | None
 ) -> tuple[float, float]:
+    """The range of disparities, px, that ``--disparity-range`` asks for, estimated where it gives none."""
     if isinstance(option, tuple):
         return option
     hint = None if option == "auto" else source.array.disparity_hint_px

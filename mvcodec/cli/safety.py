@@ -6,6 +6,7 @@ import argparse
 import re
 from dataclasses import fields
 
+from mvcodec.container.chunked_file import CHUNK_MS, MAX_CHUNK_MS
 from mvcodec.container.limits import Limits
 
 
@@ -40,3 +41,21 @@ def add_on_error(parser: argparse.ArgumentParser, default: str) -> None:
         default=default,
         help="at damage: go on with the next keyframe, or stop (default: %(default)s)",
     )
+
+
+def add_chunk_ms(parser: argparse.ArgumentParser) -> None:
+    """``--chunk-ms N``."""
+    parser.add_argument(
+        "--chunk-ms",
+        type=_chunk_ms,
+        metavar="N",
+        default=CHUNK_MS,
+        help="stream time that waits before it is written, which is what a power cut can lose;"
+        " 0 writes each frame set at once (default: %(default)s)",
+    )
+
+
+def _chunk_ms(text: str) -> int:
+    if not re.fullmatch(r"\d{1,9}", text) or int(text) > MAX_CHUNK_MS:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected 0..{MAX_CHUNK_MS} ms")
+    return int(text)
