@@ -134,7 +134,7 @@ def _on_sphere(shape: Sphere) -> _Places:
 
 
 def _rays(lighting: Lighting) -> Rays:
-    from mvcodec.kernels.illumination import Rays  # noqa: PLC0415 - Numba is slow to import
+    from mvcodec.kernels.illumination import Rays
 
     side = round(lighting.samples**0.5)
     v, u = (part.ravel() for part in np.meshgrid(_middles(side), _middles(side), indexing="ij"))
@@ -146,7 +146,7 @@ def _rays(lighting: Lighting) -> Rays:
 
 
 def _solids(shapes: Sequence[Shape]) -> Solids:
-    from mvcodec.kernels.illumination import Solids  # noqa: PLC0415 - Numba is slow to import
+    from mvcodec.kernels.illumination import Solids
 
     flat = [shape for shape in shapes if isinstance(shape, Rectangle)]
     spheres = [[*shape.centre, shape.radius] for shape in shapes if isinstance(shape, Sphere)]
@@ -163,7 +163,7 @@ def _blocked(
     places: _Places, solids: Sequence[Solids], rays: Rays, known: NDArray[np.bool_] | None = None
 ) -> NDArray[np.bool_]:
     """Which rays of each place are blocked by the solids, or known to be."""
-    from mvcodec.kernels.illumination import find_blocked  # noqa: PLC0415 - Numba is slow to import
+    from mvcodec.kernels.illumination import find_blocked
 
     count = len(rays.lamp) + len(rays.around)
     blocked = np.zeros((len(places.points), count), np.bool_) if known is None else known.copy()
@@ -178,7 +178,7 @@ def _blocked(
 
 def _gathered(places: _Places, blocked: NDArray[np.bool_], rays: Rays) -> NDArray[np.float64]:
     """(N, 2): what reaches each place from the lamp and from around."""
-    from mvcodec.kernels.illumination import gather_light  # noqa: PLC0415 - Numba is slow to import
+    from mvcodec.kernels.illumination import gather_light
 
     out = np.empty((len(places.points), 2))
 

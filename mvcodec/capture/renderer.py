@@ -60,7 +60,7 @@ class LitScene:
 
     def render(self, optics: Optics, eye: Vector) -> tuple[Picture, FloatMap]:
         """The picture uint8 (H, W, 3) RGB from `eye`, and float32 1/Z of each pixel's centre, 1/m."""
-        from mvcodec.kernels.raycast import find_nearest, shade  # noqa: PLC0415 - Numba is slow to import
+        from mvcodec.kernels.raycast import find_nearest, shade
 
         shapes = self._before(optics, np.array(eye))
         size = optics.height, optics.width
@@ -72,7 +72,7 @@ class LitScene:
 
     def _before(self, optics: Optics, eye: NDArray[np.float64]) -> Shapes:
         """The shapes as one camera sees them."""
-        from mvcodec.kernels.raycast import Shapes  # noqa: PLC0415 - Numba is slow to import
+        from mvcodec.kernels.raycast import Shapes
 
         towards = self._corners - eye
         spheres = self._spheres - np.append(eye, 0.0)
@@ -130,7 +130,7 @@ def _pixel_boxes(points: NDArray[np.float64], optics: Optics) -> NDArray[np.int6
 
 def _paint(shapes: Sequence[Shape], light: LightMaps, order: Sequence[int]) -> Paint:
     """The looks of the shapes, which are taken from the light maps' order by `order`."""
-    from mvcodec.kernels.texture import Paint  # noqa: PLC0415 - Numba is slow to import
+    from mvcodec.kernels.texture import Paint
 
     surfaces = [shape.surface for shape in shapes]
     names = tuple(dict.fromkeys(surface.photograph for surface in surfaces))

@@ -168,7 +168,7 @@ class MotorcycleScene:
     licence = "Middlebury 2014 stereo data (Scharstein et al., GCPR 2014), as in scikit-image"
 
     def __init__(self, settings: SceneSettings) -> None:
-        import skimage.data  # noqa: PLC0415 - slow to import, and most commands never need it
+        import skimage.data
 
         load: Callable[[], tuple[Picture, Picture, FloatMap]] = skimage.data.stereo_motorcycle
         left, right, disparity = load()

@@ -38,7 +38,7 @@ def photograph(name: str) -> Picture:
     Args:
         name: one of PHOTOGRAPHS.
     """
-    import skimage.data  # noqa: PLC0415 - slow to import, and most commands never need it
+    import skimage.data
 
     picture: NDArray[np.uint8] = getattr(skimage.data, name)()
     if picture.ndim == 2:

@@ -19,7 +19,7 @@ Arms = NDArray[np.int16]
 
 
 @njit(cache=True, nogil=True)
-def ad_census_costs(  # noqa: PLR0917  (numba takes positions)
+def ad_census_costs(
     first: NDArray[np.uint8],
     second: NDArray[np.uint8],
     first_census: NDArray[np.uint64],
@@ -105,7 +105,7 @@ def cross_arms(picture: NDArray[np.uint8], reach: int, near_reach: int, colour: 
 
 
 @njit(cache=True, nogil=True)
-def sum_along_rows(  # noqa: PLR0917
+def sum_along_rows(
     volume: Volume, arms: Arms, counts: NDArray[np.float32], start: int, stop: int, sums: Volume
 ) -> None:
     """Sum the costs over each pixel's left and right arm, divided by its count; rows start .. stop - 1."""
@@ -124,7 +124,7 @@ def sum_along_rows(  # noqa: PLR0917
 
 
 @njit(cache=True, nogil=True)
-def sum_along_columns(  # noqa: PLR0917
+def sum_along_columns(
     volume: Volume, arms: Arms, counts: NDArray[np.float32], start: int, stop: int, sums: Volume
 ) -> None:
     """Sum the costs over each pixel's upper and lower arm, by its count; columns start .. stop - 1."""
@@ -142,7 +142,7 @@ def sum_along_columns(  # noqa: PLR0917
 
 
 @njit(cache=True, nogil=True)
-def follow_rows(  # noqa: PLR0917
+def follow_rows(
     volume: Volume,
     first_edges: NDArray[np.bool_],
     second_edges: NDArray[np.bool_],
@@ -187,7 +187,7 @@ def follow_rows(  # noqa: PLR0917
 
 
 @njit(cache=True, nogil=True)
-def follow_columns(  # noqa: PLR0917
+def follow_columns(
     volume: Volume,
     first_edges: NDArray[np.bool_],
     second_edges: NDArray[np.bool_],

@@ -132,7 +132,7 @@ def gather_light(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _meets_rectangle(  # noqa: PLR0917 - compiled functions take no keyword-only arguments
+def _meets_rectangle(
     corners: NDArray[np.float64],
     normals: NDArray[np.float64],
     across: NDArray[np.float64],
@@ -162,7 +162,7 @@ def _meets_rectangle(  # noqa: PLR0917 - compiled functions take no keyword-only
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _meets_sphere(  # noqa: PLR0917 - compiled functions take no keyword-only arguments
+def _meets_sphere(
     spheres: NDArray[np.float64],
     ox: float,
     oy: float,

@@ -37,7 +37,7 @@ def forward_sources(
 
 
 @njit(cache=True, nogil=True)
-def blend_pair(  # noqa: PLR0917 - compiled functions take no keyword-only arguments
+def blend_pair(
     left: NDArray[np.uint8],
     right: NDArray[np.uint8],
     left_disparity: NDArray[np.float32],

@@ -124,7 +124,7 @@ def _gather(numbers: NDArray[np.int16], x: int, y: int, rivals: NDArray[np.int64
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _share_pixel(  # noqa: PLR0917 - compiled functions take no keyword-only arguments
+def _share_pixel(
     h: NDArray[np.float64],
     spheres: NDArray[np.float64],
     rivals: NDArray[np.int64],

@@ -38,7 +38,7 @@ class Paint(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def filtered(  # noqa: PLR0917 - compiled functions take no keyword-only arguments
+def filtered(
     texels: NDArray[np.uint8],
     levels: NDArray[np.int64],
     texture: int,
@@ -78,7 +78,7 @@ def filtered(  # noqa: PLR0917 - compiled functions take no keyword-only argumen
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _between_levels(  # noqa: PLR0917 - compiled functions take no keyword-only arguments
+def _between_levels(
     texels: NDArray[np.uint8], levels: NDArray[np.int64], texture: int, level: float, u: float, v: float
 ) -> tuple[float, float, float]:
     """Trilinear: linear between the two levels around `level`, bilinear in each."""
@@ -92,7 +92,7 @@ def _between_levels(  # noqa: PLR0917 - compiled functions take no keyword-only 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _bilinear(  # noqa: PLR0917 - compiled functions take no keyword-only arguments
+def _bilinear(
     texels: NDArray[np.uint8], levels: NDArray[np.int64], texture: int, level: int, u: float, v: float
 ) -> tuple[float, float, float]:
     """One level at (u, v) in sizes of the texture, repeated as in a mirror."""
@@ -123,7 +123,7 @@ def _mirrored(index: int, size: int) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def light_at(  # noqa: PLR0917 - compiled functions take no keyword-only arguments
+def light_at(
     light: NDArray[np.float32], light_maps: NDArray[np.int64], number: int, closed: bool, u: float, v: float
 ) -> tuple[float, float, float]:
     """The factors on red, green, blue at (u, v) in 0..1 of a shape's light map (see Paint).
