@@ -30,9 +30,9 @@ from mvcodec.container import StreamInfo, read_info
 from mvcodec.decoder import Decoder
 from mvcodec.encoder import EncoderConfig, default_gop
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
+from mvcodec.evaluation.anchors import CodedArray, code_array
 from mvcodec.evaluation.metrics import psnr
 from mvcodec.evaluation.quality import Comparison, QualityMeter
-from mvcodec.evaluation.simulcast import Simulcast, simulcast
 from mvcodec.frames import DecodedSet, FrameSet, Picture
 from mvcodec.output.mosaic import contact_sheet, error_picture, mosaic
 from mvcodec.output.pictures import write_png
@@ -185,12 +185,12 @@ def write_compared_view(array: CameraArray, shown: Shown, path: Path) -> None:
     write_png(path, error_picture(shown.originals.pictures[view], shown.pictures[view]))
 
 
-def code_anchor(source: ArraySource, qp: int) -> Simulcast:
+def code_anchor(source: ArraySource, qp: int) -> CodedArray:
     """The full array as simulcast H.264."""
-    count = source.frame_count * len(source.array.positions)
+    count = 2 * source.frame_count * len(source.array.positions)  # each is coded and measured
     print(f"coding all {len(source.array.positions)} views as simulcast H.264", flush=True)
     with progress("simulcast", count, unit="picture") as bar:
-        return simulcast(
+        return code_array(
             source,
             rate=RateControl(qp=qp),
             gop=default_gop(source.array.fps),
@@ -199,7 +199,7 @@ def code_anchor(source: ArraySource, qp: int) -> Simulcast:
         )
 
 
-def table(info: StreamInfo, quality: Comparison, anchor: Simulcast, qp: int) -> str:
+def table(info: StreamInfo, quality: Comparison, anchor: CodedArray, qp: int) -> str:
     """Bits and quality of both, side by side."""
     seconds = info.frames / info.header.array.fps
     real = len(info.header.array.real)

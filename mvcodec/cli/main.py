@@ -21,7 +21,10 @@ COMMANDS: dict[str, str] = {
     "play": "watch a file in the browser, from any viewpoint",
     "render": "make pictures to take away: paths of the viewpoint, stereo, quilts, refocus",
     "info": "say what a file holds",
+    "recover": "write a clean file out of a damaged or unfinished one",
+    "validate": "check a file against the rules of the format, access unit by access unit",
     "compare": "measure a decoded array against its original",
+    "evaluate": "measure rate and distortion of an array against stock codecs",
 }
 """Name and purpose; each lives in mvcodec.cli.<name> as add_arguments(parser) and run(arguments)."""
 
@@ -93,7 +96,7 @@ def _fail(error: object, code: int) -> int:
     return code
 
 
-def _show_warning(  # noqa: PLR0917 - the signature of warnings.showwarning
+def _show_warning(
     message: Warning | str,
     category: type[Warning],
     filename: str,
@@ -104,7 +107,7 @@ def _show_warning(  # noqa: PLR0917 - the signature of warnings.showwarning
     text = f"mvcodec: warning: {_one_line(message)}"
     if not issubclass(category, MvCodecWarning):
         text = warnings.formatwarning(message, category, filename, lineno, line).rstrip()
-    from tqdm import tqdm  # noqa: PLC0415 - it keeps the line apart from a progress bar; --help needs none
+    from tqdm import tqdm
 
     tqdm.write(text, file=file or sys.stderr)
 

@@ -128,6 +128,12 @@ def _context(library: str, mode: Literal["r", "w"]) -> VideoCodecContext:
     return cast("VideoCodecContext", VideoCodecContext.create(library, mode))
 
 
+def library_versions() -> dict[str, str]:
+    """Versions of FFmpeg and of its coding library, on which streams and pictures depend."""
+    codec = ".".join(map(str, av.library_versions["libavcodec"]))
+    return {"ffmpeg": av.ffmpeg_version_info, "libavcodec": codec}
+
+
 def _view(plane: VideoPlane, rows: int, cols: int) -> Plane:
     """The pixels of a plane in place, without the padding at the end of each line."""
     buffer = cast("memoryview", plane)  # planes are buffers, which their annotations do not say

@@ -1,0 +1,210 @@
+"""``mvcodec evaluate``: rate and distortion of an array against stock codecs, as a report."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import warnings
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mvcodec.array import CameraArray
+from mvcodec.capture import open_input, resolve_frames
+from mvcodec.cli.arguments import add_frames, add_output_options, disparity_range, pair_of_sizes, positive_int
+from mvcodec.cli.decode import DEFAULT_SYNTHESIZER
+from mvcodec.cli.encode import OPTIONS, find_range
+from mvcodec.cli.progress import progress
+from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.errors import MissingExtra, MvCodecWarning, OutputError, SettingError
+from mvcodec.stereo.table import MATCHERS
+from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
+from mvcodec.video.codec import PRESETS
+from mvcodec.video.table import CODECS
+
+if TYPE_CHECKING:
+    from mvcodec.evaluation.study import Study
+
+EXTRA = "evaluate"
+PACKAGES = ("bjontegaard", "matplotlib")
+DEFAULT_QPS = (22, 27, 32, 37)
+POINTS = "points"
+"""The folder of measured points, inside of the report's."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``evaluate``."""
+    default = EncoderConfig()
+    parser.add_argument(
+        "input",
+        type=Path,
+        nargs="+",
+        metavar="INPUT",
+        help="an array folder, or R*C videos in row order with --grid",
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        required=True,
+        metavar="REPORT",
+        help="a folder; points that it holds already are not measured again",
+    )
+    parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
+    parser.add_argument(
+        "--real",
+        default="corners",
+        metavar="corners|all|every:K|R,R..xC,C..",
+        help="the cameras that mvcodec codes (default: corners, or both ends of a linear array)",
+    )
+    parser.add_argument(
+        "--qp", type=_whole_numbers, metavar="N,N..", help="of the pictures (default: 22,27,32,37)"
+    )
+    parser.add_argument(
+        "--anchors",
+        type=_names,
+        metavar="NAME,..",
+        help="some of simulcast, pvs (default: both; simulcast without B-frames is always there)",
+    )
+    parser.add_argument(
+        "--codec", choices=CODECS, default=default.codec, help="of mvcodec's streams (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--anchor-codecs",
+        type=_names,
+        metavar="NAME,..",
+        help=f"codecs of the anchors, some of {', '.join(CODECS)} (default: all)",
+    )
+    parser.add_argument("--disparity-qp", type=int, metavar="N", help="QP of the disparity maps")
+    parser.add_argument("--disparity-range", type=disparity_range, metavar="LO,HI|auto", help="as for encode")
+    parser.add_argument(
+        "--gop", type=int, metavar="N", help="frames from keyframe to keyframe, in all curves"
+    )
+    parser.add_argument(
+        "--preset",
+        default=default.preset,
+        metavar="NAME",
+        help=f"effort of all video encoders, one of {', '.join(PRESETS)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--matcher",
+        default=default.matcher,
+        metavar="NAME",
+        help=f"one of {', '.join(MATCHERS)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--synthesizer",
+        default=DEFAULT_SYNTHESIZER,
+        metavar="NAME",
+        help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=positive_int,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="anchors coded side by side (default: %(default)s)",
+    )
+    add_frames(parser, "frames of the input to evaluate")
+    add_output_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Measure what is not measured yet, and write the report."""
+    for package in PACKAGES:
+        if find_spec(package) is None:
+            raise MissingExtra(package, EXTRA)
+    from mvcodec.evaluation.fingerprint import examine
+    from mvcodec.evaluation.points import PointStore
+    from mvcodec.evaluation.report import FILES, write_report
+    from mvcodec.evaluation.study import StudyRun
+
+    output: Path = arguments.output
+    if output.exists() and not output.is_dir():
+        raise OutputError(output, "it is a file; a report is a folder")
+    source = open_input(arguments.input, grid=arguments.grid, real=arguments.real)
+    chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
+    study = _study(source.array, arguments, find_range(source, chosen, arguments.disparity_range))
+    facts = examine(source, chosen)
+    store = PointStore(output / POINTS)
+    with progress("evaluate", None, quiet=arguments.quiet, unit="picture") as bar:
+        measuring = StudyRun(study, source, chosen, facts, store, bar.update)
+        bar.total = measuring.picture_count
+        points = measuring.measure()
+    document = write_report(output, measuring, points)
+    for text in document["warnings"]:
+        warnings.warn(text, MvCodecWarning, stacklevel=2)
+    doubtful = [name for name, delta in document["bd_rate"].items() if delta["warnings"]]
+    if doubtful:
+        text = f"BD figures against {', '.join(doubtful)} rest on little; report.html says why"
+        warnings.warn(text, MvCodecWarning, stacklevel=2)
+    if not arguments.quiet:
+        print(table(document))
+        print(f"\nIn {output}: {', '.join(FILES)}")
+
+
+def table(document: dict[str, Any]) -> str:
+    """mvcodec's points, then its distance to each anchor, for people."""
+    ours = document["curves"][0]
+    head = f"{'QP':>3} {'kbit/s':>10} {'Y-PSNR dB all':>14} {'virtual':>8} {'worst':>7} {'maps':>5}"
+    lines = [f"{ours['label']:28} {head}"]
+    for point in ours["points"]:
+        psnr, share = point["psnr_y"], point["bits_split"]["disparity"] / point["bits"]
+        virtual = _cell(psnr["virtual"], "8.2f")
+        lines.append(
+            f"{'':28} {point['qp']:3} {point['kbps']:10.1f} {psnr['all']:14.2f} {virtual}"
+            f" {psnr['worst']:7.2f} {share:5.0%}"
+        )
+    lines.append(f"\n{'against':28} {'BD-rate all':>12} {'virtual':>9}  quality in common")
+    labels = {curve["name"]: curve["label"] for curve in document["curves"]}
+    for name, delta in document["bd_rate"].items():
+        overlap = delta["overlap_db"]
+        common = "none" if overlap is None else f"{overlap[0]:.2f} to {overlap[1]:.2f} dB"
+        percent = f"{_cell(delta['all'], '+10.1f')} % {_cell(delta['virtual'], '+7.1f')} %"
+        lines.append(f"{labels[name]:28} {percent}  {common}")
+    return "\n".join(lines)
+
+
+def _study(array: CameraArray, arguments: argparse.Namespace, range_px: tuple[float, float]) -> Study:
+    from mvcodec.evaluation.anchors import ANCHORS
+    from mvcodec.evaluation.study import Study, translate_qps
+
+    make_synthesizer(arguments.synthesizer)  # a wrong name is told before anything is measured
+    try:
+        config = EncoderConfig(
+            disparity_qp=arguments.disparity_qp,
+            disparity_range_px=range_px,
+            gop=arguments.gop,
+            matcher=arguments.matcher,
+            preset=arguments.preset,
+            codec=arguments.codec,
+        )
+        Encoder(array, config).flush()
+        return Study(
+            qps=arguments.qp or translate_qps(DEFAULT_QPS, "h264", arguments.codec),
+            config=config,
+            synthesizer=arguments.synthesizer,
+            anchors=arguments.anchors or tuple(ANCHORS),
+            anchor_codecs=arguments.anchor_codecs or tuple(CODECS),
+            jobs=arguments.jobs,
+        )
+    except SettingError as error:
+        raise SettingError(OPTIONS.get(error.setting, error.setting), error.found, error.expected) from None
+
+
+def _whole_numbers(text: str) -> tuple[int, ...]:
+    if not re.fullmatch(r"\d{1,2}(,\d{1,2})*", text):
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected whole numbers such as 22,27,32,37")
+    return tuple(sorted({int(number) for number in text.split(",")}))
+
+
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(dict.fromkeys(name for name in text.split(",") if name))
+    if not names:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected names between commas")
+    return names
+
+
+def _cell(value: float | None, form: str) -> str:
+    width = int(form.lstrip("+").split(".")[0])
+    return f"{'-':>{width}}" if value is None else f"{value:{form}}"

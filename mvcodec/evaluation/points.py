@@ -1,0 +1,115 @@
+"""Measured points of rate-distortion curves, and the folder that keeps them for the next run."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from mvcodec.errors import OutputError
+from mvcodec.evaluation.quality import Comparison, ViewQuality
+
+
+@dataclass(frozen=True, slots=True)
+class BitsSplit:
+    """Where bits go.
+
+    Attributes:
+        texture: access units of pictures.
+        disparity: access units of maps.
+        rest: container, headers, calibration.
+    """
+
+    texture: int
+    disparity: int
+    rest: int
+
+
+@dataclass(frozen=True, slots=True)
+class CurvePoint:
+    """One coding of an array.
+
+    Attributes:
+        qp: of the pictures, on the codec's own scale.
+        bits: of all frame sets.
+        kbps: the same, kbit/s.
+        quality: of the decoded (and synthesised) views.
+        encode_seconds, decode_seconds: wall-clock seconds of the stages, without measuring.
+        file: name of the kept stream in the folder, where it is kept.
+    """
+
+    qp: int
+    bits: int
+    kbps: float
+    quality: Comparison
+    split: BitsSplit
+    encode_seconds: float
+    decode_seconds: float
+    file: str | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """As ``report.json`` has it: without the single views."""
+        return {
+            "qp": self.qp,
+            "bits": self.bits,
+            "kbps": self.kbps,
+            "psnr_y": self.quality.psnr_y.to_json(),
+            "ssim": self.quality.ssim.to_json(),
+            "bits_split": asdict(self.split),
+            "encode_seconds": self.encode_seconds,
+            "decode_seconds": self.decode_seconds,
+        }
+
+
+class PointStore:
+    """A folder of measured points, each under a key of everything that it depends on.
+
+    Args:
+        folder: made when the first point comes.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def name(self, depends_on: Mapping[str, Any]) -> str:
+        """The key: the same for equal settings, inputs and versions (plain JSON values)."""
+        text = json.dumps(depends_on, sort_keys=True)
+        return hashlib.blake2b(text.encode(), digest_size=10).hexdigest()
+
+    def find(self, name: str) -> CurvePoint | None:
+        """The point of this key, if it was measured; a damaged one counts as not measured."""
+        try:
+            document = json.loads((self.folder / f"{name}.json").read_bytes())
+            point = _from_document(document["point"])
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        complete = point.file is None or (self.folder / point.file).is_file()
+        return point if complete else None
+
+    def keep(self, name: str, point: CurvePoint, depends_on: Mapping[str, Any]) -> None:
+        """Store a point, complete or not at all.
+
+        Raises:
+            OutputError: the system refuses.
+        """
+        document = {"depends_on": dict(depends_on), "point": asdict(point)}
+        path = self.folder / f"{name}.json"
+        part = path.with_suffix(f".{os.getpid()}.part")
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            part.write_text(json.dumps(document, indent=1), encoding="utf-8")
+            part.replace(path)
+        except OSError as error:
+            raise OutputError(path, error.strerror or error) from None
+
+
+def _from_document(document: Mapping[str, Any]) -> CurvePoint:
+    fields = dict(document)
+    views = tuple(
+        ViewQuality(**{**view, "position": tuple(view["position"])}) for view in fields["quality"]["views"]
+    )
+    return CurvePoint(**{**fields, "quality": Comparison(views), "split": BitsSplit(**fields["split"])})

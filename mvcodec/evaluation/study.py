@@ -1,0 +1,258 @@
+"""A rate-distortion study: which curves there are, and measuring their points, side by side and only once."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any
+
+from mvcodec.capture import ArraySource
+from mvcodec.encoder import EncoderConfig, default_gop
+from mvcodec.errors import OutputError, SettingError
+from mvcodec.evaluation.anchors import ANCHORS, SIMULCAST, Anchor, code_array, sequence_settings
+from mvcodec.evaluation.chain import measure_chain
+from mvcodec.evaluation.fingerprint import ANCHORS_REVISION, CHAIN, InputFacts, code_digest
+from mvcodec.evaluation.points import BitsSplit, CurvePoint, PointStore
+from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.video.codec import RateControl
+from mvcodec.video.pyav import library_versions
+from mvcodec.video.table import CODECS, find_codec
+
+OURS = "mvcodec"
+
+CODEC_NAMES = {"h264": "H.264", "hevc": "HEVC", "av1": "AV1"}
+
+AV1_SLOPE, AV1_OFFSET = 2.4, -30.0
+"""SVT-AV1's QP that gives the luma PSNR of libx264's QP: a line through what was measured on shop_v4
+(simulcast, preset slow): 22, 27, 32, 37 have the quality of 23, 38, 49, 58."""
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """What to measure.
+
+    Attributes:
+        qps: of the pictures, on the scale of config.codec; ascending.
+        config: of the encoder; its qp is replaced by each of `qps`.
+        synthesizer: name.
+        anchors: keys of ANCHORS. Simulcast without B-frames is measured in any case.
+        anchor_codecs: keys of CODECS.
+        jobs: anchors that are coded side by side, one thread each.
+
+    Raises:
+        SettingError: an unknown name, or no QP.
+    """
+
+    qps: tuple[int, ...]
+    config: EncoderConfig
+    synthesizer: str
+    anchors: tuple[str, ...] = tuple(ANCHORS)
+    anchor_codecs: tuple[str, ...] = tuple(CODECS)
+    jobs: int = 1
+
+    def __post_init__(self) -> None:
+        if not self.qps or any(a >= b for a, b in zip(self.qps, self.qps[1:], strict=False)):
+            raise SettingError("--qp", ",".join(map(str, self.qps)), "one or more QPs, ascending")
+        for name in self.anchors:
+            if name not in ANCHORS:
+                raise SettingError("--anchors", name, f"some of {', '.join(ANCHORS)}")
+        for name in self.anchor_codecs:
+            find_codec(name)
+        for qp in self.qps:
+            replace(self.config, qp=qp)
+
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """mvcodec's own curve, then the anchors, those of its own codec first."""
+        own = self.config.codec
+        codecs = sorted(self.anchor_codecs, key=lambda codec: codec != own)
+        found = {(SIMULCAST.name, own): Curve(SIMULCAST.name, own, self.qps, SIMULCAST)}
+        for codec in codecs:
+            qps = translate_qps(self.qps, own, codec)
+            for anchor in (anchor for family in self.anchors for anchor in ANCHORS[family]):
+                name = anchor.name if codec == own else f"{anchor.name}-{codec}"
+                found.setdefault((anchor.name, codec), Curve(name, codec, qps, anchor))
+        return Curve(OURS, own, self.qps, None), *found.values()
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One curve of a study.
+
+    Attributes:
+        name: as report.json has it: mvcodec, or the anchor's, with its codec where that is not
+            mvcodec's own.
+        codec: key of CODECS.
+        qps: on the codec's own scale.
+        anchor: None for mvcodec's own curve.
+    """
+
+    name: str
+    codec: str
+    qps: tuple[int, ...]
+    anchor: Anchor | None
+
+    @property
+    def label(self) -> str:
+        """For legends and tables."""
+        what = OURS if self.anchor is None else self.anchor.title
+        return f"{what}, {CODEC_NAMES[self.codec]}"
+
+
+def translate_qps(qps: tuple[int, ...], source: str, target: str) -> tuple[int, ...]:
+    """The QPs of another codec that come closest in quality, without repetition."""
+    if (source == "av1") == (target == "av1"):
+        return qps
+    if target == "av1":
+        found = [AV1_SLOPE * qp + AV1_OFFSET for qp in qps]
+    else:
+        found = [(qp - AV1_OFFSET) / AV1_SLOPE for qp in qps]
+    top = find_codec(target).max_qp
+    return tuple(dict.fromkeys(min(max(round(qp), 1), top) for qp in found))
+
+
+class StudyStopped(Exception):
+    """Raised inside of jobs to end them after an interruption."""
+
+
+class StudyRun:
+    """One run of a study on an input.
+
+    Args:
+        chosen: frame numbers, consecutive.
+        facts: of the input.
+        store: keeps the points; those that it holds are not measured again.
+        on_pictures: called, from any thread, with how many more pictures were coded or measured.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        source: ArraySource,
+        chosen: range,
+        facts: InputFacts,
+        store: PointStore,
+        on_pictures: Callable[[int], object],
+    ) -> None:
+        self.study, self.source, self.chosen, self.facts, self.store = study, source, chosen, facts, store
+        self._on_pictures = on_pictures
+        self._stop = threading.Event()
+        self._chain_code = code_digest(CHAIN)
+        self.gop = study.config.gop or default_gop(source.array.fps)
+
+    @property
+    def picture_count(self) -> int:
+        """What `on_pictures` counts to."""
+        pictures = len(self.chosen) * len(self.source.array.positions)
+        return sum(len(curve.qps) * self._weight(curve) * pictures for curve in self.study.curves)
+
+    def measure(self) -> dict[str, list[CurvePoint]]:
+        """The points of every curve by its name.
+
+        mvcodec's own, one at a time, since they use all cores; then the anchors, in jobs.
+
+        Raises:
+            SettingError, InputError, OutputError: as the stages raise them.
+        """
+        points: dict[str, list[CurvePoint]] = {}
+        futures: dict[str, list[Future[CurvePoint]]] = {}
+        with ThreadPoolExecutor(self.study.jobs) as pool:
+            try:
+                for curve in self.study.curves:
+                    if curve.anchor is None:
+                        points[curve.name] = [self._point(curve, qp) for qp in curve.qps]
+                    else:
+                        futures[curve.name] = [pool.submit(self._point, curve, qp) for qp in curve.qps]
+                for name, jobs in futures.items():
+                    points[name] = [job.result() for job in jobs]
+            except BaseException:
+                self._stop.set()
+                pool.shutdown(cancel_futures=True)
+                raise
+        return points
+
+    def options(self, curve: Curve, qp: int) -> Mapping[str, Any]:
+        """What a point is coded with, as plain JSON values."""
+        if curve.anchor is None:
+            settings = {**asdict(replace(self.study.config, qp=qp)), "gop": self.gop}
+            return {**settings, "synthesizer": self.study.synthesizer}
+        tour = curve.anchor.tours(self.source.array)[0]
+        settings = find_codec(curve.codec).options(
+            sequence_settings(
+                self.source.array,
+                curve.anchor,
+                tour,
+                rate=RateControl(qp=qp),
+                gop=self.gop,
+                preset=self.study.config.preset,
+            )
+        )
+        return {"codec": curve.codec, "gop": self.gop, **settings}
+
+    def _point(self, curve: Curve, qp: int) -> CurvePoint:
+        own = curve.anchor is None
+        depends_on = {
+            "curve": OURS if curve.anchor is None else curve.anchor.name,
+            "options": self.options(curve, qp),
+            "input": self.facts.digest,
+            "code": self._chain_code if own else ANCHORS_REVISION,
+            "libraries": library_versions(),
+        }
+        name = self.store.name(depends_on)
+        point = self.store.find(name)
+        if point is not None:
+            self._on_pictures(self._weight(curve) * len(self.chosen) * len(self.source.array.positions))
+            return point
+        point = self._own_point(name, qp) if own else self._anchor_point(curve, qp)
+        self.store.keep(name, point, depends_on)
+        return point
+
+    def _own_point(self, name: str, qp: int) -> CurvePoint:
+        try:
+            self.store.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(self.store.folder, error.strerror or error) from None
+        return measure_chain(
+            self.source,
+            self.chosen,
+            replace(self.study.config, qp=qp),
+            make_synthesizer(self.study.synthesizer),
+            self.store.folder / f"{name}.mcap",
+            partial(self._on_pictures, 1),
+        )
+
+    def _anchor_point(self, curve: Curve, qp: int) -> CurvePoint:
+        assert curve.anchor is not None
+        coded = code_array(
+            self.source,
+            slice(self.chosen.start, self.chosen.stop),
+            anchor=curve.anchor,
+            codec=curve.codec,
+            rate=RateControl(qp=qp),
+            gop=self.gop,
+            preset=self.study.config.preset,
+            threads=1,
+            on_picture=self._go_on,
+        )
+        return CurvePoint(
+            qp=qp,
+            bits=coded.bits,
+            kbps=coded.bits * self.source.array.fps / len(self.chosen) / 1000,
+            quality=coded.quality,
+            split=BitsSplit(coded.bits, 0, 0),
+            encode_seconds=coded.encode_seconds,
+            decode_seconds=coded.decode_seconds,
+        )
+
+    def _go_on(self) -> None:
+        if self._stop.is_set():
+            raise StudyStopped
+        self._on_pictures(1)
+
+    @staticmethod
+    def _weight(curve: Curve) -> int:
+        """How often each picture is counted: an anchor codes and measures it."""
+        return 1 if curve.anchor is None else 2
