@@ -25,7 +25,7 @@ from mvcodec.output.view_path import FILE_SUFFIX, SHAPES, read_waypoints, walk_s
 from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
 
 QUILT = "quilt"
-FROZEN_SECONDS = 3
+FROZEN_SECONDS = 2
 """How long a path takes while time stands."""
 
 
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--view",
         type=view,
         metavar="ROW,COL",
-        help="viewpoint, in steps of the input's grid (default: middle)",
+        help="viewpoint, in steps of the input's grid (default: middle); of a quilt or slice its row",
     )
     parser.add_argument("--style", choices=STYLES, default="mono", help="default: %(default)s")
     parser.add_argument(
