@@ -64,6 +64,11 @@ class ExactFile:
         self._file.seek(place)
         return size
 
+    @property
+    def place(self) -> int:
+        """Offset in a seekable file of what is read next."""
+        return self._file.tell() - len(self._returned)
+
     def seek(self, offset: int) -> None:
         """Go on reading from there."""
         self._returned, self.crc = b"", 0

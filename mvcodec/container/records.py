@@ -194,29 +194,35 @@ def _decompress(data: bytes, size: int, limits: Limits, *, whole: bool) -> bytes
         raise RecordError(f"a chunk that cannot be unpacked: {error}") from None
 
 
+def chunk_places(data: bytes, *, whole: bool = True) -> Iterator[tuple[int, bytes, int]]:
+    """Opcode, content and offset of each record of an unpacked chunk.
+
+    Raises:
+        RecordError: the end is inside a record; with `whole` false, that ends it.
+    """
+    at = 0
+    while at + HEAD.size <= len(data):
+        opcode, size = HEAD.unpack_from(data, at)
+        end = at + HEAD.size + size
+        if end > len(data):
+            break
+        yield opcode, data[at + HEAD.size : end], at
+        at = end
+    if whole and at < len(data):
+        raise RecordError("a chunk that ends inside a record")
+
+
 def chunk_records(data: bytes, *, whole: bool = True) -> Iterator[Channel | Message]:
     """The channels and messages of an unpacked chunk.
 
     Raises:
         RecordError: a record is damaged; with `whole` false, the end is only where it breaks off.
     """
-    at = 0
-    while at < len(data):
-        if at + HEAD.size > len(data):
-            break
-        opcode, size = HEAD.unpack_from(data, at)
-        at += HEAD.size
-        if at + size > len(data):
-            break
+    for opcode, content, _ in chunk_places(data, whole=whole):
         if opcode == Opcode.CHANNEL:
-            yield parse_channel(data[at : at + size])
+            yield parse_channel(content)
         elif opcode == Opcode.MESSAGE:
-            yield parse_message(data[at : at + size])
-        at += size
-    else:
-        return
-    if whole:
-        raise RecordError("a chunk that ends inside a record")
+            yield parse_message(content)
 
 
 def parse_channel(content: bytes) -> Channel:

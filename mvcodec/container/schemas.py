@@ -37,6 +37,7 @@ HEADER_SCHEMA = json.dumps(
             "codec": {"type": "string"},
             "array": {"type": "object"},
             "disparity_range_px": {"type": "array"},
+            "disparity_scale": {"enum": [1, 2]},
             "first_frame": {"type": "integer"},
             "settings": {"type": "object"},
         },

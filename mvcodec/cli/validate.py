@@ -1,0 +1,59 @@
+"""``mvcodec validate``: a file against the rules of the format."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from mvcodec.cli.info import count
+from mvcodec.cli.safety import add_limits
+from mvcodec.container.finding import Finding, Severity
+from mvcodec.container.limits import Limits
+from mvcodec.errors import MvCodecError
+from mvcodec.evaluation.validation import validate
+
+
+class NotClean(MvCodecError):
+    """Something was found."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``validate``."""
+    parser.add_argument("input", type=Path, metavar="FILE.mcap")
+    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
+    add_limits(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Print what is wrong; the exit code is 0 only where nothing is."""
+    findings = validate(arguments.input, Limits(**dict(arguments.limit)))
+    if arguments.json:
+        document = {
+            "file": str(arguments.input),
+            "clean": not findings,
+            "findings": [_document(finding) for finding in findings],
+        }
+        print(json.dumps(document))
+    else:
+        print("\n".join(_line(finding) for finding in findings) or f"{arguments.input}: clean")
+    if findings:
+        errors = sum(finding.severity is Severity.ERROR for finding in findings)
+        found = f"{count(errors, 'error')}, {count(len(findings) - errors, 'warning')}"
+        raise NotClean(f"{arguments.input}: {found}")
+
+
+def _document(finding: Finding) -> dict[str, Any]:
+    return {
+        "severity": finding.severity.value,
+        "code": finding.code,
+        "topic": finding.topic,
+        "time_s": None if finding.time_ns is None else finding.time_ns / 1e9,
+        "message": finding.message,
+    }
+
+
+def _line(finding: Finding) -> str:
+    time = "" if finding.time_ns is None else f" at {finding.time_ns / 1e9:.3f} s"
+    return f"{finding.severity}: {finding.topic or 'file'}{time}: {finding.message} [{finding.code}]"

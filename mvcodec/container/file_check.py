@@ -1,0 +1,363 @@
+"""Goes through an MCAP file record by record and compares its indexes with what is there."""
+
+from __future__ import annotations
+
+import io
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import (
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Message,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+
+from mvcodec.container.exact_file import ExactFile
+from mvcodec.container.finding import Finding, error
+from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.container.records import (
+    DAMAGE,
+    HEAD,
+    MAGIC,
+    CutOff,
+    RecordError,
+    chunk_places,
+    find_chunk,
+    parse_chunk,
+    parse_message,
+    read_record,
+    unpack,
+)
+
+_CRC_BYTES = 4
+
+_IN_DATA = {
+    Opcode.SCHEMA,
+    Opcode.CHANNEL,
+    Opcode.MESSAGE,
+    Opcode.ATTACHMENT,
+    Opcode.CHUNK,
+    Opcode.MESSAGE_INDEX,
+    Opcode.METADATA,
+}
+_IN_SUMMARY: dict[int, Any] = {
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.STATISTICS: Statistics,
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckedMessage:
+    """A message with all that its channel says of it."""
+
+    topic: str
+    schema: str
+    encoding: str
+    record: Message
+
+
+@dataclass(slots=True)
+class _Seen:
+    """What the data section holds, as the summary must repeat it."""
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    chunks: list[ChunkIndex] = field(default_factory=list)
+    metadata: list[MetadataIndex] = field(default_factory=list)
+    counts: Counter[int] = field(default_factory=Counter)
+    times: tuple[int, int] | None = None
+    attachments: int = 0
+
+
+class FileCheck:
+    """Yields a file's messages in order; afterwards `findings` says what is wrong with their container.
+
+    Args:
+        file: a seekable file.
+        limits: what is more than that is not read.
+
+    Attributes:
+        findings: in the order of the file.
+        metadata: name -> values of the last metadata record of that name, with all their keys.
+    """
+
+    def __init__(self, file: BinaryIO, limits: Limits = DEFAULT_LIMITS) -> None:
+        self._file, self._limits = ExactFile(file), limits
+        self.findings: list[Finding] = []
+        self.metadata: dict[str, dict[str, str]] = {}
+        self._seen = _Seen()
+        self._message_indexes: dict[int, MessageIndex] | None = None
+        self._time_ns: int | None = None
+        self._whole = True
+
+    def messages(self) -> Iterator[CheckedMessage]:
+        """Go through the file."""
+        if self._file.read(len(MAGIC)) != MAGIC:
+            self._tell("magic", "the file does not begin as MCAP does")
+            if not find_chunk(self._file, self._limits):
+                return
+        first = True
+        while (record := self._next()) is not None:
+            opcode, content, place = record
+            if first and opcode != Opcode.HEADER and self._whole:
+                self._tell("header", "the first record is no header")
+            if opcode == Opcode.HEADER and not first:
+                self._tell("header", "a second header")
+            first = False
+            if opcode == Opcode.DATA_END:
+                self._end_message_indexes()
+                self._check_summary(place, content)
+                return
+            if opcode == Opcode.CHUNK:
+                self._end_message_indexes()
+                yield from self._chunk(content, place)
+            elif opcode in _IN_DATA:
+                yield from self._outside(opcode, content, place)
+            elif opcode != Opcode.HEADER:
+                self._tell("record", f"a record of kind {opcode} among the data")
+        self._end_message_indexes()
+
+    def _tell(self, code: str, message: str) -> None:
+        self.findings.append(error(code, message, time_ns=self._time_ns))
+
+    def _next(self) -> tuple[int, bytes, int] | None:
+        """The next record and its place; None where there is none (which is told)."""
+        while True:
+            place = self._file.place
+            try:
+                record = read_record(self._file, self._limits)
+            except CutOff as cut:
+                self._file.give_back(cut.content)
+                if not (cut.content and find_chunk(self._file, self._limits)):
+                    self._tell("cut-off", "the file breaks off here")
+                    return None
+                self._tell("record", "a record that is longer than what follows")
+            except RecordError as damage:
+                self._tell("record", str(damage))
+                if not find_chunk(self._file, self._limits):
+                    return None
+            else:
+                if record is None:
+                    self._tell("cut-off", "the file breaks off here")
+                    return None
+                return record[0], record[1], place
+            self._whole = False
+
+    def _chunk(self, content: bytes, place: int) -> Iterator[CheckedMessage]:
+        self._message_indexes = {}
+        try:
+            head, packed = parse_chunk(content, self._limits)
+            index = ChunkIndex(
+                chunk_length=HEAD.size + len(content),
+                chunk_start_offset=place,
+                compression=head.compression,
+                compressed_size=len(packed),
+                message_end_time=head.end_ns,
+                message_index_length=0,
+                message_index_offsets={},
+                message_start_time=head.start_ns,
+                uncompressed_size=head.size,
+            )
+            self._seen.chunks.append(index)
+            if not head.crc:
+                self._tell("chunk", "a chunk without a checksum")
+            messages = self._unpacked(unpack(head, packed, self._limits))
+        except RecordError as damage:
+            self._tell("chunk", f"damage ({damage})")
+            self._whole = False
+            return
+        times = [message.record.log_time for message in messages]
+        if times and (min(times), max(times)) != (head.start_ns, head.end_ns):
+            self._tell("chunk", "a chunk whose times are not those of its messages")
+        yield from messages
+
+    def _unpacked(self, data: bytes) -> list[CheckedMessage]:
+        messages = []
+        for opcode, content, place in chunk_places(data):
+            if opcode == Opcode.MESSAGE:
+                message, number = self._message(content)
+                if message is not None:
+                    messages.append(message)
+                    assert self._message_indexes is not None
+                    index = self._message_indexes.setdefault(number, MessageIndex(number, []))
+                    index.records.append((message.record.log_time, place))
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._declare(opcode, content)
+            else:
+                self._tell("record", f"a record of kind {opcode} inside a chunk")
+        return messages
+
+    def _message(self, content: bytes) -> tuple[CheckedMessage | None, int]:
+        record = parse_message(content)
+        seen, number = self._seen, record.channel_id
+        self._time_ns = record.log_time
+        seen.counts[number] += 1
+        first, last = seen.times or (record.log_time, record.log_time)
+        seen.times = min(first, record.log_time), max(last, record.log_time)
+        channel = seen.channels.get(number)
+        if channel is None:
+            self._tell("channel", f"a message of unknown channel {number}")
+            return None, number
+        schema = seen.schemas.get(channel.schema_id)
+        name = "" if schema is None else schema.name
+        return CheckedMessage(channel.topic, name, channel.message_encoding, record), number
+
+    def _declare(self, opcode: int, content: bytes) -> None:
+        kind = Schema if opcode == Opcode.SCHEMA else Channel
+        record = self._parsed(kind, content)
+        if record is None:
+            return
+        known: dict[int, Any] = self._seen.schemas if opcode == Opcode.SCHEMA else self._seen.channels
+        if known.setdefault(record.id, record) != record:
+            self._tell("channel", f"two different {kind.__name__.lower()}s of number {record.id}")
+        if opcode == Opcode.CHANNEL:
+            if record.schema_id and record.schema_id not in self._seen.schemas:
+                self._tell("channel", f"{record.topic}: unknown schema {record.schema_id}")
+            if any(other.topic == record.topic and other.id != record.id for other in known.values()):
+                self._tell("channel", f"{record.topic}: two channels")
+
+    def _outside(self, opcode: int, content: bytes, place: int) -> Iterator[CheckedMessage]:
+        """A record of the data section outside of chunks."""
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            self._declare(opcode, content)
+        elif opcode == Opcode.MESSAGE:
+            self._tell("record", "a message outside of chunks")
+            message, _ = self._message(content)
+            if message is not None:
+                yield message
+        elif opcode == Opcode.MESSAGE_INDEX:
+            self._check_message_index(content, place)
+        elif opcode == Opcode.METADATA:
+            record = self._parsed(Metadata, content)
+            if record is not None:
+                self.metadata.setdefault(record.name, {}).update(record.metadata)
+                self._seen.metadata.append(
+                    MetadataIndex(length=HEAD.size + len(content), name=record.name, offset=place)
+                )
+        else:
+            self._seen.attachments += 1
+
+    def _check_message_index(self, content: bytes, place: int) -> None:
+        found = self._parsed(MessageIndex, content)
+        if found is None:
+            return
+        if self._message_indexes is None:
+            self._tell("message-index", "a message index without a chunk before it")
+            return
+        if self._message_indexes.pop(found.channel_id, None) != found:
+            self._tell("message-index", f"the message index of channel {found.channel_id} is wrong")
+        if self._seen.chunks:
+            chunk = self._seen.chunks[-1]
+            chunk.message_index_offsets[found.channel_id] = place
+            chunk.message_index_length += HEAD.size + len(content)
+
+    def _end_message_indexes(self) -> None:
+        for number in self._message_indexes or ():
+            self._tell("message-index", f"no message index of channel {number} behind its chunk")
+        self._message_indexes = None
+
+    def _parsed(self, kind: Any, content: bytes) -> Any:
+        """A record of the MCAP library's kind; None (told) where it is damaged."""
+        try:
+            stream = ReadDataStream(io.BytesIO(content))
+            record = kind.read(stream)
+        except DAMAGE as damage:
+            self._tell("record", f"a damaged {kind.__name__} ({str(damage) or type(damage).__name__})")
+            return None
+        if stream.count != len(content):
+            self._tell("record", f"a {kind.__name__} with bytes behind its end")
+        return record
+
+    def _check_summary(self, data_end: int, content: bytes) -> None:
+        crc = self._parsed(DataEnd, content)
+        start = self._file.place
+        if self._whole and crc is not None and crc.data_section_crc:
+            self._file.seek(0)
+            self._file.skip(data_end)
+            if self._file.crc != crc.data_section_crc:
+                self._tell("data-crc", "data whose checksum is wrong")
+            self._file.seek(start)
+        found: dict[int, list[Any]] = {}
+        while (record := self._next()) is not None:
+            opcode, body, place = record
+            if opcode == Opcode.FOOTER:
+                self._check_footer(body, start, place)
+                break
+            kind = _IN_SUMMARY.get(opcode)
+            if kind is not None:
+                found.setdefault(opcode, []).append(self._parsed(kind, body))
+            elif opcode != Opcode.SUMMARY_OFFSET:
+                self._tell("record", f"a record of kind {opcode} in the summary")
+        else:
+            return
+        if self._whole:
+            self._compare(found)
+
+    def _check_footer(self, content: bytes, start: int, place: int) -> None:
+        footer = self._parsed(Footer, content)
+        if footer is None:
+            return
+        if footer.summary_start != start:
+            self._tell("footer", f"a summary at {footer.summary_start}, found at {start}")
+        end = self._file.place
+        if footer.summary_crc:
+            self._file.seek(start)
+            covered = self._file.read(place + HEAD.size + len(content) - _CRC_BYTES - start)
+            if zlib.crc32(covered) != footer.summary_crc:
+                self._tell("summary-crc", "a summary whose checksum is wrong")
+            self._file.seek(end)
+        if self._file.read(len(MAGIC)) != MAGIC:
+            self._tell("magic", "the file does not end as MCAP does")
+        elif self._file.read(1):
+            self._tell("magic", "something behind the end")
+
+    def _compare(self, found: dict[int, list[Any]]) -> None:
+        """The summary with what the data hold."""
+        seen = self._seen
+        expected: dict[int, tuple[str, list[Any]]] = {
+            Opcode.SCHEMA: ("schemas", sorted(seen.schemas.values(), key=lambda record: record.id)),
+            Opcode.CHANNEL: ("channels", sorted(seen.channels.values(), key=lambda record: record.id)),
+            Opcode.CHUNK_INDEX: ("chunk indexes", seen.chunks),
+            Opcode.METADATA_INDEX: ("metadata indexes", seen.metadata),
+            Opcode.STATISTICS: ("statistics", [self._statistics()]),
+        }
+        for opcode, (name, records) in expected.items():
+            there = found.get(opcode, [])
+            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                there = sorted((record for record in there if record), key=lambda record: record.id)
+            if there != records:
+                self._tell("summary", f"the {name} of the summary are not those of the file")
+        if len(found.get(Opcode.ATTACHMENT_INDEX, [])) != seen.attachments:
+            self._tell("summary", "the attachment indexes of the summary are not those of the file")
+
+    def _statistics(self) -> Statistics:
+        seen = self._seen
+        start, end = seen.times or (0, 0)
+        return Statistics(
+            attachment_count=seen.attachments,
+            channel_count=len(seen.channels),
+            channel_message_counts=dict(seen.counts),
+            chunk_count=len(seen.chunks),
+            message_count=seen.counts.total(),
+            message_end_time=end,
+            message_start_time=start,
+            metadata_count=len(seen.metadata),
+            schema_count=len(seen.schemas),
+        )

@@ -1,0 +1,113 @@
+"""The messages of a file against its header: schemas, frame ids, stamps, calibration and places."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from google.protobuf.message import DecodeError
+from mcap.records import Message
+from mcap.well_known import MessageEncoding
+
+from mvcodec.container import schemas
+from mvcodec.container.file_check import CheckedMessage
+from mvcodec.container.finding import Finding, error, warning
+from mvcodec.stream import HEADER_TRACK, StreamHeader
+
+_KINDS: dict[str, Any] = {
+    "video": CompressedVideo,
+    "calibration": CameraCalibration,
+    "transform": FrameTransform,
+}
+
+
+class MessageCheck:
+    """Checks messages one by one.
+
+    Args:
+        header: the first one; it says what there must be.
+        add: takes what is wrong.
+
+    Attributes:
+        topics: those that the header explains.
+    """
+
+    def __init__(self, header: StreamHeader, add: Callable[[Finding], None]) -> None:
+        self._add = add
+        self._format = schemas.VIDEO_FORMATS.get(header.codec, header.codec)
+        self._rig = schemas.rig_messages(header.array)
+        self._kinds = {message.topic: message.kind for message in self._rig}
+        self._frames: dict[str, str] = {}
+        for track in header.tracks:
+            assert track.camera is not None
+            self._kinds[track.topic] = "video"
+            self._frames[track.topic] = schemas.frame_id(track.camera)
+        self.topics = {HEADER_TRACK.topic, *self._kinds}
+        self._unseen = set(self.topics)
+        self._due: set[tuple[str, bytes]] | None = None
+        self._key: Message | None = None
+
+    def begin_keyframe(self, record: Message) -> None:
+        """Expect calibration and place of every camera at this time."""
+        self._end_keyframe()
+        self._key = record
+        self._due = {(message.topic, message.at(record.log_time)) for message in self._rig}
+
+    def push(self, message: CheckedMessage) -> bytes | None:
+        """Check a message on one of the topics; returns the access unit of a video message."""
+        self._unseen.discard(message.topic)
+        where = (message.topic, message.record.log_time)
+        if message.topic == HEADER_TRACK.topic:
+            if message.encoding != MessageEncoding.JSON:
+                self._add(error("schema", f"message encoding {message.encoding!r}, expected json", *where))
+            return None
+        kind = self._kinds[message.topic]
+        name = schemas.PROTOBUF_SCHEMAS[kind][0]
+        if (message.schema, message.encoding) != (name, MessageEncoding.Protobuf):
+            found = f"{message.schema!r} as {message.encoding!r}"
+            self._add(error("schema", f"{found}, expected {name} as protobuf", *where))
+            return None
+        if kind == "video":
+            return self._video(message)
+        try:
+            key = (message.topic, _KINDS[kind].FromString(message.record.data).SerializeToString())
+        except DecodeError as failure:
+            self._add(error("schema", f"a damaged message ({failure})", *where))
+            return None
+        if self._due is not None and key in self._due:
+            self._due.remove(key)
+        else:
+            text = "not as the header has it, or not at a keyframe, or twice"
+            self._add(error("rig", f"{name}: {text}", *where))
+        return None
+
+    def end(self) -> list[Finding]:
+        """What never came."""
+        self._end_keyframe()
+        return [error("topic", "no message at all", topic) for topic in sorted(self._unseen)]
+
+    def _end_keyframe(self) -> None:
+        if self._due and self._key is not None:
+            for topic in sorted({topic for topic, _ in self._due}):
+                self._add(error("rig", "missing at a keyframe", topic, self._key.log_time))
+        self._due = None
+
+    def _video(self, message: CheckedMessage) -> bytes | None:
+        record, where = message.record, (message.topic, message.record.log_time)
+        try:
+            parsed = CompressedVideo.FromString(record.data)
+        except DecodeError as failure:
+            self._add(error("schema", f"a damaged message ({failure})", *where))
+            return None
+        if parsed.format != self._format:
+            self._add(error("format", f"format {parsed.format!r}, expected {self._format!r}", *where))
+        frame = self._frames[message.topic]
+        if parsed.frame_id != frame:
+            self._add(error("frame-id", f"frame_id {parsed.frame_id!r}, expected {frame!r}", *where))
+        if parsed.timestamp.seconds * 1_000_000_000 + parsed.timestamp.nanos != record.log_time:
+            self._add(warning("time", "its timestamp is not its log_time", *where))
+        data: bytes = parsed.data
+        return data
