@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -20,6 +21,7 @@ from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.stereo.consistency import drop_speckles, median
+from mvcodec.stereo.subpixel import refine
 
 THREADS = 2
 LEVELS_MULTIPLE = 8
@@ -41,7 +43,8 @@ class JointSettings:
         through_cost: of a disparity that another camera sees through, 0..254.
         tolerance_px: maps agree within this, px, above 0.
         border_speckle_px: smallest patch that counts where no partner sees the whole range, pixels.
-        median_size: window of the last median, 0 (none), 3 or 5.
+        median_size: window of the median after completion, 0 (none), 3 or 5.
+        subpixel_steps: steps of sub-pixel refinement, see `mvcodec.stereo.subpixel`.
 
     Raises:
         SettingError: a setting is outside its range.
@@ -65,6 +68,7 @@ class JointSettings:
     tolerance_px: float = 1.0
     border_speckle_px: int = 50
     median_size: int = 5
+    subpixel_steps: int = 2
 
     def __post_init__(self) -> None:
         limits = {
@@ -76,6 +80,7 @@ class JointSettings:
             "hold_limit": (0, 254),
             "contrast": (1e-3, 255),
             "tolerance_px": (1e-3, 255),
+            "subpixel_steps": (0, 20),
         }
         for name in self.__slots__:
             low, high = limits.get(name, (0, 1e6))
@@ -132,11 +137,16 @@ class Joint:
                 lambda camera: self._complete(array, camera, views[camera], raw, valid, low, levels),
                 array.real,
             )
-            return {
-                camera: DisparityMap(
-                    median(np.clip(values, *range_px), self.settings.median_size, range_px), valid[camera]
-                )
+            maps = {
+                camera: median(np.clip(values, *range_px), self.settings.median_size, range_px)
                 for camera, values in zip(array.real, completed, strict=True)
+            }
+            for _ in range(self.settings.subpixel_steps):
+                refined = pool.map(partial(_refined, array, views, maps, valid), array.real)
+                maps = dict(zip(array.real, refined, strict=True))
+            return {
+                camera: DisparityMap(np.clip(values, *range_px), valid[camera])
+                for camera, values in maps.items()
             }
 
     def _decide(
@@ -239,6 +249,18 @@ class Joint:
         )
         holds = valid[camera] & (np.abs(completed - raw[camera]) <= 1.5)
         return np.where(holds, raw[camera], completed)
+
+
+def _refined(
+    array: CameraArray,
+    views: Mapping[Position, _View],
+    maps: Mapping[Position, FloatMap],
+    valid: Mapping[Position, Mask],
+    camera: Position,
+) -> FloatMap:
+    partners = _partners(array, camera)
+    said = [(views[partner].grey, maps[partner]) for partner in partners]
+    return refine(maps[camera], valid[camera], views[camera].grey, said, _steps(array, camera, partners))
 
 
 def _prepare(array: CameraArray, picture: Picture) -> _View:
