@@ -23,9 +23,10 @@ from mvcodec.container.follow import FollowedFile
 from mvcodec.container.limits import Limits
 from mvcodec.decoder import Decoder
 from mvcodec.errors import OutputError, SettingError, StreamError
-from mvcodec.frames import DecodedSet, Picture
+from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.output.forms import FORMS, OutputPlan, open_form
 from mvcodec.output.mcap_views import McapViews
+from mvcodec.output.provenance import ProvenanceWriter
 from mvcodec.stream import StreamHeader
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
@@ -34,9 +35,12 @@ DEFAULT_SYNTHESIZER = "layered"
 MOSAIC = "mosaic"
 MOSAIC_SUFFIXES = (".mp4", ".png")
 MCAP = "mcap"
+FORMS_WITH_PROVENANCE = ("array", "png")
+"""Those whose views are folders of pictures, which it can lie beside."""
+
 THREADS = 2
 
-Sink = Callable[[DecodedSet, list[Picture]], None]
+Sink = Callable[[DecodedSet, list[RenderedView]], None]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,6 +74,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
     )
     parser.add_argument(
+        "--provenance",
+        action="store_true",
+        help="beside each view's picture 000000.png write 000000.provenance.png, 8-bit RGB: red = number of"
+        " real cameras that saw the pixel (0 = filled), green + 256 * blue = its depth layer (1 = farthest,"
+        f" 0 = none). For --format {' and '.join(FORMS_WITH_PROVENANCE)}",
+    )
+    parser.add_argument(
         "--follow", action="store_true", help="wait for more where the file ends, until it is complete"
     )
     add_frames(parser, "frames of the file to decode")
@@ -98,11 +109,11 @@ def run(arguments: argparse.Namespace) -> None:
         sink: Sink | None = None
         try:
             for decoded in decoder:
-                pictures = _render(synthesizer, decoded, plan.viewpoints, pool)
+                views = _render(synthesizer, decoded, plan.viewpoints, pool)
                 if sink is None:
                     plan = replace(plan, first_frame=decoded.index)
-                    sink = _open_sink(form, arguments.output, plan, outputs)
-                sink(decoded, pictures)
+                    sink = _open_sink(form, arguments, plan, outputs)
+                sink(decoded, views)
                 bar.update()
                 if form == MOSAIC and arguments.output.suffix.lower() == ".png":
                     break  # one picture holds one frame set
@@ -129,6 +140,9 @@ def _check_output(form: str, arguments: argparse.Namespace) -> None:
     path: Path = arguments.output
     if arguments.input != STANDARD and Path(arguments.input).resolve() == path.resolve():
         raise SettingError("OUT", path, "another file than IN.mcap")
+    if arguments.provenance and form not in FORMS_WITH_PROVENANCE:
+        allowed = " or ".join(FORMS_WITH_PROVENANCE)
+        raise SettingError("--provenance", f"--format {form}", f"--format {allowed}")
     if form not in (MOSAIC, MCAP):
         if str(path) == STANDARD:
             raise SettingError("OUT", path, f"a folder, or --format {MCAP} for standard output")
@@ -143,22 +157,35 @@ def _check_output(form: str, arguments: argparse.Namespace) -> None:
         raise OutputError(path, f"it is a folder, --format {form} needs a file")
 
 
-def _open_sink(form: str, target: Path, plan: OutputPlan, outputs: ExitStack) -> Sink:
-    """What takes the pictures of each frame set; `outputs` completes it."""
+def _open_sink(form: str, arguments: argparse.Namespace, plan: OutputPlan, outputs: ExitStack) -> Sink:
+    """What takes the views of each frame set; `outputs` completes it."""
+    target: Path = arguments.output
     if form == MCAP:
         live = str(target) == STANDARD
-        views = outputs.enter_context(
+        mcap = outputs.enter_context(
             McapViews(standard_output() if live else target, plan, 0 if live else CHUNK_MS)
         )
-        return lambda decoded, pictures: views.push(pictures, decoded.index, decoded.time_ns)
+        return lambda decoded, views: mcap.push(_pictures(views), decoded.index, decoded.time_ns)
     writer = outputs.enter_context(open_form(form, target, plan))
-    return lambda _, pictures: writer.push(pictures)
+    if not arguments.provenance:
+        return lambda _, views: writer.push(_pictures(views))
+    provenance = ProvenanceWriter(target, plan.names)
+
+    def push(_: DecodedSet, views: list[RenderedView]) -> None:
+        writer.push(_pictures(views))
+        provenance.push(views)
+
+    return push
+
+
+def _pictures(views: Sequence[RenderedView]) -> list[Picture]:
+    return [view.pixels for view in views]
 
 
 def _render(
     synthesizer: Synthesizer, decoded: DecodedSet, viewpoints: Sequence[Viewpoint], pool: ThreadPoolExecutor
-) -> list[Picture]:
-    return list(pool.map(lambda viewpoint: synthesizer.render(decoded, viewpoint).pixels, viewpoints))
+) -> list[RenderedView]:
+    return list(pool.map(lambda viewpoint: synthesizer.render(decoded, viewpoint), viewpoints))
 
 
 def _plan(header: StreamHeader, arguments: argparse.Namespace) -> OutputPlan:

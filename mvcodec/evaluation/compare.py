@@ -5,10 +5,16 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
+from mvcodec.array import Position
 from mvcodec.capture import ArraySource, resolve_frames
 from mvcodec.errors import InputError, MvCodecWarning
+from mvcodec.evaluation.provenance import ProvenanceMeter, read_seen_by
 from mvcodec.evaluation.quality import Comparison, QualityMeter
+from mvcodec.frames import FrameSet
 
 THREADS = 2
 
@@ -18,6 +24,7 @@ def compare(
     decoded: ArraySource,
     frames: slice | None = None,
     *,
+    provenance: Path | None = None,
     on_frame: Callable[[], object] | None = None,
 ) -> Comparison:
     """Measure every view of a decoded array.
@@ -27,28 +34,39 @@ def compare(
 
     Args:
         frames: a range of the frames that both hold (a slice of step 1); all of them if None.
+        provenance: the folder where ``decode --provenance`` wrote (the decoded array's own one, as a
+            rule); the virtual views are measured by how many cameras saw each pixel then.
         on_frame: called after each frame that was measured.
 
     Raises:
-        InputError: the grids or the picture sizes differ, or no frame is in both.
+        InputError: the grids or the picture sizes differ, no frame is in both, or provenance is missing.
         SettingError: `frames` selects none.
     """
     first, count = _common_frames(original, decoded)
     _check_equal(original, decoded)
     chosen = resolve_frames(frames, count, decoded.name)
     positions = decoded.array.positions
-    meter = QualityMeter(decoded.listed_real or ())
+    real = decoded.listed_real or ()
+    meter, by_cameras = QualityMeter(real), ProvenanceMeter()
+
+    def measure(ours: FrameSet, theirs: FrameSet, view: Position) -> None:
+        pictures = ours.pictures[view], theirs.pictures[view]
+        meter.push(view, *pictures)
+        if provenance is not None and view not in real:
+            number = theirs.index - decoded.first_frame
+            by_cameras.push(*pictures, read_seen_by(provenance, view, number, decoded.array))
+
     with ThreadPoolExecutor(THREADS) as pool:
         for ours, theirs in zip(
             original.frame_sets(_own_slice(original, first, chosen), positions),
             decoded.frame_sets(_own_slice(decoded, first, chosen), positions),
             strict=True,
         ):
-            pictures = ([ours.pictures[view], theirs.pictures[view]] for view in positions)
-            list(pool.map(meter.push, positions, *zip(*pictures, strict=True)))
+            list(pool.map(partial(measure, ours, theirs), positions))
             if on_frame is not None:
                 on_frame()
-    return meter.result()
+    result = meter.result()
+    return result if provenance is None else replace(result, by_provenance=by_cameras.result())
 
 
 def common_frame_count(original: ArraySource, decoded: ArraySource) -> int:

@@ -44,7 +44,7 @@ def psnr(original: Picture, picture: Picture) -> float:
     first, second = _pair(original, picture)
     # The sum of squares is an integer: exact in int64 whatever the order of the additions.
     difference = first.astype(np.int32) - second
-    return _decibel(float(np.square(difference).sum(dtype=np.int64)) / difference.size)
+    return decibel(float(np.square(difference).sum(dtype=np.int64)) / difference.size)
 
 
 def psnr_saturated(original: Picture, picture: Picture) -> float:
@@ -62,7 +62,7 @@ def psnr_saturated(original: Picture, picture: Picture) -> float:
     first, second = _pair(original, picture)
     positive = np.maximum(first.astype(np.int32) - second, 0)
     clipped = np.minimum(np.square(positive), 255)
-    return _decibel(float(clipped.sum(dtype=np.int64)) / clipped.size)
+    return decibel(float(clipped.sum(dtype=np.int64)) / clipped.size)
 
 
 def ssim(original: Picture, picture: Picture) -> float:
@@ -148,17 +148,18 @@ def bad_pixel_rate(
     return float((error > threshold_px).mean())
 
 
+def decibel(mean_squared_error: float) -> float:
+    """PSNR of 8-bit values in dB; 100 dB for no error at all."""
+    if mean_squared_error == 0:
+        return IDENTICAL_PSNR_DB
+    return float(10 * np.log10(PEAK * PEAK / mean_squared_error))
+
+
 def _pair(original: Picture, picture: Picture) -> tuple[Luma, Luma]:
     if original.shape[:2] != picture.shape[:2]:
         sizes = " and ".join(f"{p.shape[1]}x{p.shape[0]}" for p in (original, picture))
         raise SettingError("pictures", sizes, "pictures of equal size")
     return luma(original), luma(picture)
-
-
-def _decibel(mean_squared_error: float) -> float:
-    if mean_squared_error == 0:
-        return IDENTICAL_PSNR_DB
-    return float(10 * np.log10(PEAK * PEAK / mean_squared_error))
 
 
 def _window_mean(plane: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from mvcodec.array import Position
 from mvcodec.evaluation.metrics import psnr, ssim
+from mvcodec.evaluation.provenance import ProvenanceQuality
 from mvcodec.frames import Picture
 
 
@@ -57,9 +58,12 @@ class Comparison:
 
     Attributes:
         views: in row order.
+        by_provenance: the pixels of the virtual views by how many real cameras saw them (0 = filled);
+            None where that is not known.
     """
 
     views: tuple[ViewQuality, ...]
+    by_provenance: Mapping[int, ProvenanceQuality] | None = None
 
     @property
     def psnr_y(self) -> Summary:
@@ -73,7 +77,7 @@ class Comparison:
 
     def to_json(self) -> dict[str, Any]:
         """The form that ``mvcodec compare --json`` prints."""
-        return {
+        document: dict[str, Any] = {
             "psnr_y": self.psnr_y.to_json(),
             "ssim": self.ssim.to_json(),
             "views": [
@@ -87,6 +91,11 @@ class Comparison:
                 for view in self.views
             ],
         }
+        if self.by_provenance is not None:
+            document["by_provenance"] = {
+                str(cameras): quality.to_json() for cameras, quality in self.by_provenance.items()
+            }
+        return document
 
 
 class QualityMeter:
