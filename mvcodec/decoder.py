@@ -21,6 +21,7 @@ from mvcodec.synthesis.stand_in import fill_absent
 from mvcodec.video.codec import Planes
 from mvcodec.video.colour import even_size, to_picture
 from mvcodec.video.disparity_code import dequantise
+from mvcodec.video.map_size import coded_size, enlarged, small_size
 from mvcodec.video.table import find_codec
 from mvcodec.video.track import TrackDecoder
 
@@ -189,9 +190,13 @@ class Decoder:
             codec = find_codec(header.codec)
         except SettingError as error:
             raise StreamError(self._name, f"codec {error.found}", error.expected) from None
-        size = even_size(header.array.width, header.array.height)
+        width, height = header.array.width, header.array.height
+        sizes = {
+            TrackKind.TEXTURE: even_size(width, height),
+            TrackKind.DISPARITY: coded_size(width, height, header.disparity_scale),
+        }
         self._header = header
-        self._decoders = {track: TrackDecoder(codec, size) for track in header.tracks}
+        self._decoders = {track: TrackDecoder(codec, sizes[track.kind]) for track in header.tracks}
         self._assembler.start(header.tracks)
         self._absent, self._skipping = frozenset(), False
 
@@ -224,7 +229,8 @@ class Decoder:
         textures = [planes[Track(TrackKind.TEXTURE, camera)] for camera in there]
         maps = [planes[Track(TrackKind.DISPARITY, camera)] for camera in there]
         pictures = dict(zip(there, self._pool.map(self._picture, textures), strict=True))
-        disparities = dict(zip(there, self._pool.map(self._map, maps), strict=True))
+        found = self._pool.map(self._map, maps, pictures.values())
+        disparities = dict(zip(there, found, strict=True))
         if reasons:
             pictures, disparities = fill_absent(array, pictures, disparities)
         absent = tuple(camera for camera in array.real if camera in reasons)
@@ -265,10 +271,11 @@ class Decoder:
         array = self.header.array
         return to_picture(planes, array.width, array.height)
 
-    def _map(self, planes: Planes) -> DisparityMap:
+    def _map(self, planes: Planes, picture: Picture) -> DisparityMap:
         header = self.header
-        codes = planes.y[: header.array.height, : header.array.width]
-        return dequantise(codes, header.disparity_range_px)
+        width, height = small_size(header.array.width, header.array.height, header.disparity_scale)
+        found = dequantise(planes.y[:height, :width], header.disparity_range_px)
+        return found if header.disparity_scale == 1 else enlarged(found.values_px, picture)
 
 
 def _note(reasons: dict[Position, StreamError], track: Track, error: StreamError) -> None:

@@ -28,17 +28,14 @@ from mvcodec.video.codec import (
 )
 from mvcodec.video.colour import even_size, grey_planes, to_planes
 from mvcodec.video.disparity_code import quantise
+from mvcodec.video.disparity_rate import default_disparity_qp, default_disparity_scale
+from mvcodec.video.map_size import MEDIANS, check_median, check_scale, coded_size, to_coded
 from mvcodec.video.table import find_codec
 
 WORKERS = 2
 
 DISPARITY_SHARE = 0.4
 """The maps' share in bitrate mode; `default_disparity_qp` came to 0.5 on shop_v3 at QP 32, SGBM maps."""
-
-
-def default_disparity_qp(qp: float) -> int:
-    """The maps' constant QP for a texture QP (or CRF): two below it, within 1..51."""
-    return min(max(round(qp) - 2, 1), 51)
 
 
 def default_gop(fps: float) -> int:
@@ -57,6 +54,10 @@ class EncoderConfig:
         bitrate_kbps: average of all video tracks together, kbit/s.
         disparity_qp: constant quantiser of the maps, as qp; by default `default_disparity_qp`, or
             a DISPARITY_SHARE of the bit rate. Given, bitrate_kbps is that of the pictures alone.
+        disparity_scale: 2: maps are coded at half the pictures' size each way, 1: at all of it; by
+            default `default_disparity_scale`.
+        disparity_median: window of the median that maps are smoothed with before coding, odd, px of
+            the coded map; 0: off; by default `MEDIANS` has it for the scale.
         gop: frame sets from keyframe to keyframe, at most one second; by default one second.
         matcher: name of a matcher (``sad``), one with its refinement (``sad+dlr``), or one's own.
         preset: effort of the video encoder.
@@ -78,6 +79,8 @@ class EncoderConfig:
     preset: str = "slow"
     disparity_range_px: tuple[float, float] | None = None
     codec: str = "h264"
+    disparity_scale: int | None = None
+    disparity_median: int | None = None
 
     def __post_init__(self) -> None:
         max_qp = find_codec(self.codec).max_qp
@@ -85,25 +88,37 @@ class EncoderConfig:
         check_qp("disparity_qp", self.disparity_qp, max_qp)
         RateControl(self.qp, self.crf, self.bitrate_kbps).check_scale(max_qp)
         check_preset(self.preset)
+        check_scale(self.disparity_scale)
+        check_median(self.disparity_median)
         if self.gop is not None and self.gop < 1:
             raise SettingError("gop", self.gop, "at least 1")
         span = self.disparity_range_px
         if span is not None and not (math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]):
             raise SettingError("disparity_range_px", list(span), "lo < hi")
 
-    def rate_of(self, kind: TrackKind, cameras: int) -> RateControl:
-        """The rate control of one track of a kind, in an array of `cameras` real cameras."""
+    @property
+    def quality(self) -> float | None:
+        """The pictures' QP or CRF; None where a bit rate governs."""
+        return self.qp if self.qp is not None else self.crf
+
+    def scale_for(self, array: CameraArray) -> int:
+        """The scale of the maps of an array."""
+        if self.disparity_scale is not None:
+            return self.disparity_scale
+        return default_disparity_scale(self.quality, self.codec, array.width, array.height)
+
+    def rate_of(self, kind: TrackKind, array: CameraArray) -> RateControl:
+        """The rate control of one track of a kind."""
         if kind is TrackKind.DISPARITY and self.disparity_qp is not None:
             return RateControl(qp=self.disparity_qp)
         if self.bitrate_kbps is not None:
             maps = 0.0 if self.disparity_qp is not None else DISPARITY_SHARE
             share = maps if kind is TrackKind.DISPARITY else 1 - maps
-            return RateControl(bitrate_kbps=max(self.bitrate_kbps * share / cameras, 1.0))
+            return RateControl(bitrate_kbps=max(self.bitrate_kbps * share / len(array.real), 1.0))
         if kind is TrackKind.TEXTURE:
             return RateControl(qp=self.qp, crf=self.crf)
-        quality = self.qp if self.qp is not None else self.crf
-        assert quality is not None
-        return RateControl(qp=default_disparity_qp(quality))
+        assert self.quality is not None
+        return RateControl(qp=default_disparity_qp(self.quality, self.scale_for(array), self.codec))
 
 
 class Encoder:
@@ -127,6 +142,9 @@ class Encoder:
                 "gop", self._gop, f"1..{longest} (a keyframe each second at {array.fps:g} fps)"
             )
         self._matcher = _matcher(self.config.matcher)
+        self._scale = self.config.scale_for(array)
+        given = self.config.disparity_median
+        self._median = MEDIANS[self._scale] if given is None else given
         self._encoders = self._make_encoders()
         self._header: StreamHeader | None = None
         self._position = 0  # frame sets since the last keyframe, modulo the GOP
@@ -206,10 +224,13 @@ class Encoder:
 
     def _make_encoders(self) -> dict[Track, VideoEncoder]:
         array, codec = self.array, find_codec(self.config.codec)
-        width, height = even_size(array.width, array.height)
+        sizes = {
+            TrackKind.TEXTURE: even_size(array.width, array.height),
+            TrackKind.DISPARITY: coded_size(array.width, array.height, self._scale),
+        }
         encoders = {}
-        for kind in (TrackKind.TEXTURE, TrackKind.DISPARITY):
-            rate = self.config.rate_of(kind, len(array.real))
+        for kind, (width, height) in sizes.items():
+            rate = self.config.rate_of(kind, array)
             settings = VideoSettings(kind, width, height, array.fps, self._gop, rate, self.config.preset)
             encoders.update({Track(kind, camera): codec.encoder(settings) for camera in array.real})
         return encoders
@@ -220,17 +241,19 @@ class Encoder:
             from mvcodec.stereo.disparity_range import estimate_range
 
             span = estimate_range(self.array, [frames], self.array.disparity_hint_px)
-        return StreamHeader(self.array, span, self.config.codec, frames.index, self._settings_record())
+        settings = self._settings_record()
+        return StreamHeader(self.array, span, self.config.codec, frames.index, settings, self._scale)
 
     def _settings_record(self) -> dict[str, Any]:
         config, codec = self.config, find_codec(self.config.codec)
-        maps = config.rate_of(TrackKind.DISPARITY, len(self.array.real))
+        maps = config.rate_of(TrackKind.DISPARITY, self.array)
         matcher = config.matcher if isinstance(config.matcher, str) else type(config.matcher).__name__
         record = {
             "qp": config.qp,
             "crf": config.crf,
             "bitrate_kbps": config.bitrate_kbps,
             "disparity_qp": maps.qp,
+            "disparity_median": self._median,
             "gop": self._gop,
             "preset": config.preset,
             "matcher": matcher,
@@ -277,7 +300,7 @@ class Encoder:
     def _code_map(self, track: Track, disparity: DisparityMap, keyframe: bool) -> list[CodedPicture]:
         assert self._header is not None
         codes = quantise(disparity.values_px, self._header.disparity_range_px)
-        return self._code(track, grey_planes(codes), keyframe)
+        return self._code(track, grey_planes(to_coded(codes, self._scale, self._median)), keyframe)
 
     def _code(self, track: Track, planes: Planes, keyframe: bool) -> list[CodedPicture]:
         return self._encoders[track].push(planes, keyframe)

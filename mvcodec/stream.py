@@ -14,6 +14,9 @@ from mvcodec.errors import SettingError, StreamError
 
 FORMAT_VERSION = 1
 
+DISPARITY_SCALES = (1, 2)
+"""Pixels of a picture, each way, for one sample of its map."""
+
 
 class TrackKind(StrEnum):
     """What a track carries."""
@@ -68,6 +71,7 @@ class StreamHeader:
         codec: name of the video codec of all tracks.
         first_frame: index in the input of the first coded frame.
         settings: the encoder's settings, for the record (names and plain JSON values).
+        disparity_scale: 1 or 2: the maps are coded at the pictures' size, or at half of it each way.
     """
 
     array: CameraArray
@@ -75,11 +79,15 @@ class StreamHeader:
     codec: str = "h264"
     first_frame: int = 0
     settings: Mapping[str, Any] = field(default_factory=dict)
+    disparity_scale: int = 1
 
     def __post_init__(self) -> None:
         low, high = self.disparity_range_px
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise SettingError("disparity_range_px", [low, high], "lo < hi")
+        if self.disparity_scale not in DISPARITY_SCALES:
+            expected = " or ".join(map(str, DISPARITY_SCALES))
+            raise SettingError("disparity_scale", self.disparity_scale, expected)
 
     @property
     def tracks(self) -> tuple[Track, ...]:
@@ -96,6 +104,7 @@ class StreamHeader:
             "codec": self.codec,
             "array": array,
             "disparity_range_px": list(self.disparity_range_px),
+            "disparity_scale": self.disparity_scale,
             "first_frame": self.first_frame,
             "settings": dict(self.settings),
         }
@@ -141,6 +150,7 @@ class StreamHeader:
             codec=str(document["codec"]),
             first_frame=int(document["first_frame"]),
             settings=dict(document["settings"]),
+            disparity_scale=int(document.get("disparity_scale", 1)),
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import threading
 import warnings
@@ -29,10 +30,12 @@ from coding import (
 from mvcodec.array import CameraArray, Position
 from mvcodec.container import McapReader, McapWriter, read_info
 from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder, EncoderConfig, default_disparity_qp, default_gop
+from mvcodec.encoder import Encoder, EncoderConfig, default_gop
 from mvcodec.errors import InputError, MvCodecWarning, SettingError, StreamClosed, StreamError
 from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture
-from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, TrackKind
+from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind
+from mvcodec.video.disparity_rate import default_disparity_qp
+from mvcodec.video.table import find_codec
 
 ARRAY = make_array()
 
@@ -80,6 +83,61 @@ def test_round_trip(width: int, height: int, rows: int, cols: int) -> None:
             assert error_px.max() < 0.5
 
 
+@pytest.mark.parametrize(
+    ("width", "height", "rows", "cols"),
+    [(96, 64, 2, 2), (33, 17, 2, 1), (35, 50, 1, 3), (16, 16, 1, 2), (1, 1, 1, 2)],
+)
+def test_maps_of_half_size_come_back_whole(width: int, height: int, rows: int, cols: int) -> None:
+    array = make_array(width, height, rows=rows, cols=cols)
+    file = encoded_file(array, 5, qp=8, disparity_qp=4, disparity_scale=2)
+    with Decoder.open(io.BytesIO(file)) as decoder:
+        assert decoder.header.disparity_scale == 2
+        decoded = list(decoder)
+    assert len(decoded) == 5
+    for found in decoded:
+        for camera in array.real:
+            disparity = found.disparities[camera]
+            assert disparity.values_px.shape == disparity.valid.shape == (height, width)
+            error_px = np.abs(disparity.values_px - ramp(array, camera))
+            # The second nearest of four stands a quarter of a ramp's step beside their middle.
+            step_px = (RANGE_PX[1] - RANGE_PX[0]) / max(width - 1, 1)
+            assert width == 1 or error_px.mean() < 0.1 + step_px / 2
+    _assert_equal(_decoded(file, slice(3, 4))[0], decoded[3])
+
+
+def test_stock_decoders_see_the_maps_at_half_size() -> None:
+    sizes = set()
+    for packet in encode(make_array(70, 66), 1, disparity_scale=2)[0]:
+        if packet.track.kind is TrackKind.DISPARITY:
+            (planes,) = find_codec("h264").decoder().push(packet.data, "a map")
+            sizes.add(planes.y.shape)
+    assert sizes == {(34, 36)}
+
+
+def test_cameras_without_their_map_of_half_size_are_made_from_the_others() -> None:
+    packets = encode(ARRAY, 2, qp=40)
+    assert StreamHeader.from_json(packets[0][0].data).disparity_scale == 2
+    lost = Track(TrackKind.DISPARITY, ARRAY.real[1])
+    with Decoder() as decoder, pytest.warns(MvCodecWarning, match="go on without camera"):
+        found = [
+            decoded
+            for packet in (*packets[0], *packets[1])
+            if packet.track != lost
+            for decoded in decoder.push(packet)
+        ] + decoder.flush()
+    assert [decoded.absent for decoded in found] == [(ARRAY.real[1],)] * 2
+    assert found[0].disparities[ARRAY.real[1]].values_px.shape == (ARRAY.height, ARRAY.width)
+
+
+def test_headers_without_a_scale_have_maps_of_full_size() -> None:
+    document = json.loads(encode(ARRAY, 1, disparity_scale=2)[0][0].data)
+    del document["disparity_scale"]
+    assert StreamHeader.from_json(json.dumps(document).encode()).disparity_scale == 1
+    document["disparity_scale"] = 3
+    with pytest.raises(StreamError, match="disparity_scale: found 3, expected 1 or 2"):
+        StreamHeader.from_json(json.dumps(document).encode())
+
+
 def test_each_push_returns_its_own_packets_at_once() -> None:
     coded = encode(ARRAY, 12, gop=5)
     for number, packets in enumerate(coded):
@@ -91,7 +149,7 @@ def test_each_push_returns_its_own_packets_at_once() -> None:
     header = StreamHeader.from_json(coded[5][0].data)
     assert header.array == ARRAY
     assert header.first_frame == 0
-    expected = {"qp": 20, "disparity_qp": 18, "gop": 5, "preset": "veryfast", "matcher": "RampMatcher"}
+    expected = {"qp": 20, "disparity_qp": 23, "gop": 5, "preset": "veryfast", "matcher": "RampMatcher"}
     assert expected.items() <= header.settings.items()
 
 
@@ -306,6 +364,8 @@ def test_a_map_that_is_not_finite_is_named() -> None:
     ("changes", "message"),
     [
         ({"qp": 0}, r"qp: found 0, expected 1\.\.51"),
+        ({"disparity_scale": 3}, "disparity_scale: found 3, expected 1 or 2"),
+        ({"disparity_median": 4}, "disparity_median: found 4, expected 0"),
         ({"disparity_qp": 60}, r"disparity_qp: found 60, expected an integer, 1\.\.51"),
         ({"gop": 0}, r"gop: found 0, expected at least 1"),
         ({"crf": 20.0}, r"found qp and crf, expected exactly one"),
@@ -336,14 +396,20 @@ def test_default_gop_is_a_second_at_most(fps: float, gop: int) -> None:
 
 
 def test_maps_follow_the_pictures_quantiser() -> None:
-    assert [default_disparity_qp(qp) for qp in (1, 2, 27, 51)] == [1, 1, 25, 49]
-    assert config(qp=None, crf=30.0).rate_of(TrackKind.DISPARITY, 4).qp == 28
-    assert config(disparity_qp=40).rate_of(TrackKind.DISPARITY, 4).qp == 40
+    def map_qp(**changes: object) -> int | None:
+        return config(**changes).rate_of(TrackKind.DISPARITY, ARRAY).qp
+
+    assert map_qp(qp=20) == default_disparity_qp(20, 1)
+    assert map_qp(qp=None, crf=40.0) == map_qp(qp=40) == default_disparity_qp(40, 2)
+    assert map_qp(qp=40, disparity_scale=1) == default_disparity_qp(40, 1)
+    assert map_qp(disparity_qp=44) == 44
 
 
 def test_bit_rate_is_that_of_all_tracks_together() -> None:
     kbps = 800.0
-    rates = [config(qp=None, bitrate_kbps=kbps).rate_of(kind, 4).bitrate_kbps for kind in list(TrackKind)[1:]]
+    rates = [
+        config(qp=None, bitrate_kbps=kbps).rate_of(kind, ARRAY).bitrate_kbps for kind in list(TrackKind)[1:]
+    ]
     assert sum(4 * rate for rate in rates if rate is not None) == pytest.approx(kbps)
     info = read_info(io.BytesIO(encoded_file(ARRAY, 40, qp=None, bitrate_kbps=kbps)))
     assert 0.6 * kbps < info.bits.total / 4 / 1000 < 1.3 * kbps

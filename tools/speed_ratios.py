@@ -34,6 +34,7 @@ from mvcodec.synthesis.table import make_synthesizer
 from mvcodec.video.codec import Planes, VideoSettings
 from mvcodec.video.colour import even_size, grey_planes, to_planes
 from mvcodec.video.disparity_code import quantise
+from mvcodec.video.map_size import MEDIANS, coded_size, to_coded
 from mvcodec.video.table import find_codec
 
 RATIOS = {
@@ -158,17 +159,21 @@ def _write(material: Material, path: Path) -> list[list[Packet]]:
 
 def _encode(material: Material) -> Times:
     array, config = material.array, _config(material)
-    width, height = even_size(array.width, array.height)
+    scale = config.scale_for(array)
+    sizes = {
+        TrackKind.TEXTURE: even_size(array.width, array.height),
+        TrackKind.DISPARITY: coded_size(array.width, array.height, scale),
+    }
     tracks: list[tuple[VideoSettings, list[Planes]]] = []
-    for kind in (TrackKind.TEXTURE, TrackKind.DISPARITY):
-        rate = config.rate_of(kind, len(array.real))
+    for kind, (width, height) in sizes.items():
+        rate = config.rate_of(kind, array)
         settings = VideoSettings(kind, width, height, array.fps, default_gop(array.fps), rate, config.preset)
         for camera in array.real:
             if kind is TrackKind.TEXTURE:
                 planes = [to_planes(frame_set.pictures[camera]) for frame_set in material.frame_sets]
             else:
                 codes = quantise(material.maps[camera].values_px, material.range_px)
-                planes = [grey_planes(codes)] * len(material.frame_sets)
+                planes = [grey_planes(to_coded(codes, scale, MEDIANS[scale]))] * len(material.frame_sets)
             tracks.append((settings, planes))
 
     def code(track: tuple[VideoSettings, list[Planes]]) -> None:

@@ -73,6 +73,37 @@ def _two_numbers(text: str, expected: str) -> tuple[float, float]:
     return first, second
 
 
+def disparity_qp(text: str) -> int | None:
+    """A QP, or None for ``auto``."""
+    if text == "auto":
+        return None
+    if not re.fullmatch(r"-?\d{1,9}", text):
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a QP or auto")
+    return int(text)
+
+
+def add_disparity(parser: argparse.ArgumentParser) -> None:
+    """``--disparity-qp``, ``--disparity-scale`` and ``--disparity-median``."""
+    parser.add_argument(
+        "--disparity-qp",
+        type=disparity_qp,
+        metavar="N|auto",
+        help="QP of the disparity maps (default: auto, chosen for the pictures' QP)",
+    )
+    parser.add_argument(
+        "--disparity-scale",
+        type=int,
+        metavar="1|2",
+        help="2: maps at half the pictures' size each way (default: chosen for the pictures' QP)",
+    )
+    parser.add_argument(
+        "--disparity-median",
+        type=int,
+        metavar="N",
+        help="smooth maps over N x N before coding, N odd; 0: don't (default: 7, at half size 3)",
+    )
+
+
 def add_frames(parser: argparse.ArgumentParser, what: str) -> None:
     """``--frames A:B``."""
     parser.add_argument(

@@ -11,7 +11,13 @@ from pathlib import Path
 
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource, open_input, resolve_frames
-from mvcodec.cli.arguments import add_frames, add_output_options, disparity_range, pair_of_sizes
+from mvcodec.cli.arguments import (
+    add_disparity,
+    add_frames,
+    add_output_options,
+    disparity_range,
+    pair_of_sizes,
+)
 from mvcodec.cli.info import document, summary
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.progress import progress
@@ -32,6 +38,8 @@ OPTIONS = {
     "crf": "--crf",
     "bitrate_kbps": "--bitrate",
     "disparity_qp": "--disparity-qp",
+    "disparity_scale": "--disparity-scale",
+    "disparity_median": "--disparity-median",
     "gop": "--gop",
     "matcher": "--matcher",
     "preset": "--preset",
@@ -76,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=default.codec,
         help="of pictures and maps (default: %(default)s, which viewers are sure to play)",
     )
-    parser.add_argument("--disparity-qp", type=int, metavar="N", help="QP of the disparity maps")
+    add_disparity(parser)
     parser.add_argument(
         "--gop", type=int, metavar="N", help="frames from keyframe to keyframe, at most one second's"
     )
@@ -168,6 +176,8 @@ def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
         config = EncoderConfig(
             **rates,
             disparity_qp=arguments.disparity_qp,
+            disparity_scale=arguments.disparity_scale,
+            disparity_median=arguments.disparity_median,
             gop=arguments.gop,
             matcher=arguments.matcher,
             preset=arguments.preset,
