@@ -1,0 +1,88 @@
+"""Distances of rate-distortion curves, against curves whose distance is known."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from mvcodec.evaluation.bd import RatePoint, compare_curves, curve_warnings, front, overtaking
+
+RATES = (100.0, 200.0, 400.0, 800.0)
+
+
+def line(rates: tuple[float, ...] = RATES, slope_db: float = 3.0, at_100: float = 30.0) -> list[RatePoint]:
+    """A curve that gains `slope_db` with each doubling of the rate."""
+    return [(rate, at_100 + slope_db * math.log2(rate / 100)) for rate in rates]
+
+
+def test_half_the_bits_is_minus_fifty_percent_and_a_doubling_worth_of_quality() -> None:
+    delta = compare_curves(line(), [(rate / 2, decibel) for rate, decibel in line()])
+    assert delta.rate_percent == pytest.approx(-50)
+    assert delta.psnr_db == pytest.approx(3.0)
+    assert delta.overlap_db == pytest.approx((30, 39))
+    assert delta.warnings == ()
+
+
+def test_only_the_quality_that_both_reach_counts_and_is_stated() -> None:
+    # Above 34 dB the tested curve is not measured; what the anchor does there matters by its tangent alone.
+    anchor = [*line((100.0, 150.0, 250.0)), (900.0, 60.0)]
+    tested = [(rate * 0.8, decibel) for rate, decibel in line((80.0, 100.0, 150.0, 250.0))]
+    delta = compare_curves(anchor, tested)
+    assert delta.overlap_db == pytest.approx((30, 30 + 3 * math.log2(2.5)))
+    assert delta.rate_percent == pytest.approx(-20, abs=2)
+    (warning,) = delta.warnings
+    assert warning.startswith("short overlap: 30.00 to 33.97 dB, 13%")
+
+
+def test_curves_without_common_quality_have_no_bd_rate() -> None:
+    delta = compare_curves(line(at_100=50), line())
+    assert delta.rate_percent is None
+    assert delta.overlap_db is None
+    assert delta.psnr_db == pytest.approx(-20)
+    assert "no quality in common: no BD-rate" in delta.warnings
+
+
+def test_one_point_is_no_curve() -> None:
+    delta = compare_curves(line(), line()[:1])
+    assert (delta.rate_percent, delta.psnr_db, delta.overlap_db) == (None, None, None)
+    assert delta.warnings
+
+
+def test_points_that_cost_more_and_are_no_better_are_left_out_and_told() -> None:
+    dented = [*line(), (500.0, 31.0)]
+    assert front(dented) == line()
+    assert compare_curves(line(), dented).rate_percent == pytest.approx(0)
+    assert curve_warnings(dented) == ["not monotonic: 1 of 5 points are left out of BD figures"]
+    assert curve_warnings(line()) == []
+    assert "3 points" in curve_warnings(line()[1:])[0]
+
+
+def test_the_order_of_points_does_not_matter() -> None:
+    tested = [(rate * 1.3, decibel) for rate, decibel in line()]
+    assert compare_curves(line()[::-1], tested[::-1]) == compare_curves(line(), tested)
+
+
+def test_an_anchor_that_is_steeper_overtakes_where_the_curves_cross() -> None:
+    anchor = [(rate, 30 + 6 * math.log2(rate / 200)) for rate in RATES]
+    found = overtaking(anchor, line())
+    assert found is not None
+    assert found.kbps == pytest.approx(400, rel=0.01)
+    assert found.psnr_y == pytest.approx(36, abs=0.1)
+    assert not found.at_most
+
+
+def test_a_curve_that_ends_is_overtaken_at_its_best_quality() -> None:
+    ended = [(rate, decibel + 2) for rate, decibel in line()[:2]]
+    found = overtaking(line(), ended)
+    assert found is not None
+    assert found.psnr_y == pytest.approx(35, abs=0.05)
+    assert found.kbps == pytest.approx(100 * 2 ** (5 / 3), rel=0.01)
+
+
+def test_an_anchor_that_is_always_better_overtakes_at_most_there() -> None:
+    found = overtaking(line(at_100=31), line())
+    assert found is not None
+    assert found.at_most
+    assert found.kbps == 100
+    assert overtaking(line(at_100=29), line()) is None

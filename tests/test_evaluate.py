@@ -1,0 +1,289 @@
+"""`mvcodec evaluate` and `tools/rd_plot.py` on small arrays, each in a process of its own."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_line import COMMAND, fails, mvcodec, succeeds
+from small_arrays import write_array
+
+from mvcodec.capture.pictures import read_picture
+from mvcodec.cli import evaluate
+from mvcodec.cli.main import main
+from mvcodec.container import read_info
+
+ROOT = Path(__file__).parents[1]
+FAST = ("--preset", "ultrafast", "--disparity-range", "0,8", "--synthesizer", "linear")
+
+
+def report(folder: Path) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads((folder / "report.json").read_text())
+    return document
+
+
+@pytest.fixture(scope="module")
+def array(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_array(tmp_path_factory.mktemp("arrays") / "small", 2, 3, frames=2)
+
+
+@pytest.fixture(scope="module")
+def measured(array: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("reports") / "first"
+    printed = succeeds("evaluate", array, "--output", folder, "--qp", "42,30,24,36", *FAST)
+    assert "PVS, all views, AV1" in printed
+    return folder
+
+
+def test_report_has_the_documented_form(array: Path, measured: Path) -> None:
+    document = report(measured)
+    assert document["path"] == str(array)
+    assert document["grid"] == [2, 3]
+    assert document["real"] == [[0, 0], [0, 2], [1, 0], [1, 2]]
+    assert document["frames"] == 2
+    orders = ("simulcast", "simulcast-b", "pvs", "pvs-rows")
+    anchors = [f"{order}{codec}" for codec in ("", "-hevc", "-av1") for order in orders]
+    assert [curve["name"] for curve in document["curves"]] == ["mvcodec", *anchors]
+    assert list(document["bd_rate"]) == anchors
+    for curve in document["curves"]:
+        assert len(curve["points"]) == 4
+        for point in curve["points"]:
+            assert point["kbps"] == pytest.approx(point["bits"] * 10.0 / 2 / 1000)
+            assert list(point["bits_split"]) == ["texture", "disparity", "rest"]
+            assert sum(point["bits_split"].values()) == point["bits"]
+            for figures, top in ((point["psnr_y"], 60), (point["ssim"], 1)):
+                assert list(figures) == ["all", "real", "virtual", "worst"]
+                assert 0 < figures["worst"] <= figures["all"] < top
+            assert point["encode_seconds"] > 0
+            assert point["decode_seconds"] > 0
+    assert [point["qp"] for point in document["curves"][0]["points"]] == [24, 30, 36, 42]
+    for delta in document["bd_rate"].values():
+        low, high = delta["overlap_db"]
+        assert low < high
+        assert isinstance(delta["all"], float)
+        assert (delta["virtual"] is None) == (delta["virtual_overlap_db"] is None)
+    assert document["versions"]["av"]
+
+
+def test_bits_of_our_own_curve_are_those_of_the_file_with_its_container(measured: Path) -> None:
+    files = {path.stat().st_size * 8: path for path in (measured / "points").glob("*.mcap")}
+    points = report(measured)["curves"][0]["points"]
+    assert sorted(files) == sorted(point["bits"] for point in points)
+    for point in points:
+        bits = read_info(files[point["bits"]]).bits
+        assert point["bits_split"] == {
+            "texture": bits.texture,
+            "disparity": bits.disparity,
+            "rest": bits.other,
+        }
+
+
+def test_our_own_curve_is_what_encode_decode_and_compare_give(
+    array: Path, measured: Path, tmp_path: Path
+) -> None:
+    options = ("--qp", "30", "--preset", "ultrafast", "--disparity-range", "0,8")
+    succeeds("encode", array, tmp_path / "x.mcap", *options)
+    succeeds("decode", tmp_path / "x.mcap", tmp_path / "out", "--synthesizer", "linear")
+    compared = json.loads(succeeds("compare", array, tmp_path / "out", "--json"))
+    point = report(measured)["curves"][0]["points"][1]
+    for metric in ("psnr_y", "ssim"):
+        assert point[metric] == pytest.approx(compared[metric])
+
+
+def test_simulcast_of_an_array_whose_cameras_are_all_real_costs_what_our_pictures_cost(
+    tmp_path: Path,
+) -> None:
+    folder = ROOT / "samples" / "room_2x2"
+    arguments = ("--frames", "0:2", "--qp", "30", "--anchors", "pvs", "--anchor-codecs", "h264")
+    printed = succeeds("evaluate", folder, "--output", tmp_path, *arguments, *FAST)
+    document = report(tmp_path)
+    assert (document["input"], document["frames"]) == ("room", 2)
+    assert [curve["name"] for curve in document["curves"]] == ["mvcodec", "simulcast", "pvs", "pvs-rows"]
+    ours, simulcast = (curve["points"][0] for curve in document["curves"][:2])
+    assert simulcast["bits"] == ours["bits_split"]["texture"]
+    assert simulcast["psnr_y"] == ours["psnr_y"]
+    assert ours["psnr_y"]["virtual"] is None
+    assert document["bd_rate"]["pvs"]["virtual"] is None
+    assert " - %" in printed
+
+
+def test_the_page_needs_nothing_from_elsewhere_and_shows_everything(measured: Path) -> None:
+    page = (measured / "report.html").read_text()
+    assert not re.findall(r"""(?:src|href)=["'](?!data:)""", page)
+    assert "<script" not in page
+    assert page.count('src="data:image/') == 5
+    for curve in report(measured)["curves"]:
+        assert curve["label"] in page
+    assert read_picture(measured / "rd.png").shape[1] > 1000
+    assert (measured / "rd.svg").read_text().startswith("<?xml")
+
+
+def test_table_of_views_has_every_view_of_every_point(measured: Path) -> None:
+    with (measured / "views.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 13 * 4 * 6
+    ours = [row for row in rows if row["curve"] == "mvcodec" and row["qp"] == "24"]
+    assert [(int(row["row"]), int(row["col"])) for row in ours] == [
+        (r, c) for r in range(2) for c in range(3)
+    ]
+    mean = sum(float(row["psnr_y_db"]) for row in ours) / 6
+    assert mean == pytest.approx(report(measured)["curves"][0]["points"][0]["psnr_y"]["all"], abs=1e-3)
+    assert [row["kind"] for row in ours].count("real") == 4
+
+
+def point_times(folder: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_mtime_ns for path in (folder / "points").glob("*.json")}
+
+
+def test_points_are_measured_once(array: Path, measured: Path) -> None:
+    before, first = point_times(measured), report(measured)
+    assert len(before) == 13 * 4
+    succeeds("evaluate", array, "--output", measured, "--qp", "24,30,36,42", *FAST)
+    assert point_times(measured) == before
+    assert report(measured) == first
+
+
+def test_other_settings_are_measured_anew(array: Path, measured: Path, tmp_path: Path) -> None:
+    shutil.copytree(measured, tmp_path / "copy")
+    before = point_times(tmp_path / "copy")
+    arguments = ("--qp", "24,30,36,42", *FAST, "--disparity-qp", "45")
+    succeeds("evaluate", array, "--output", tmp_path / "copy", *arguments)
+    assert len(point_times(tmp_path / "copy").keys() - before.keys()) == 4, "mvcodec's own points alone"
+    maps = [
+        [point["bits_split"]["disparity"] for point in report(folder)["curves"][0]["points"]]
+        for folder in (measured, tmp_path / "copy")
+    ]
+    assert maps[1][0] < maps[0][0]
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped(array: Path, tmp_path: Path) -> None:
+    arguments = [str(array), "--output", str(tmp_path / "r"), "--qp", "20,22,24,26,28,30", *FAST]
+    arguments += ["--anchors", "simulcast", "--anchor-codecs", "h264"]
+    with subprocess.Popen(
+        [*COMMAND, "evaluate", *arguments, "--jobs", "1"], stderr=subprocess.PIPE, text=True
+    ) as process:
+        deadline = time.monotonic() + 60
+        while len(point_times(tmp_path / "r")) < 3 and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert errors.strip().splitlines()[-1] == "mvcodec: error: interrupted"
+    kept = point_times(tmp_path / "r")
+    assert 3 <= len(kept) < 3 * 6
+    assert not (tmp_path / "r" / "report.json").exists()
+    succeeds("evaluate", *arguments)
+    assert kept.items() <= point_times(tmp_path / "r").items()
+    assert len(report(tmp_path / "r")["curves"][0]["points"]) == 6
+
+
+@pytest.mark.parametrize("codec", ["hevc", "av1"])
+def test_our_own_streams_in_another_codec(array: Path, tmp_path: Path, codec: str) -> None:
+    arguments = ("--qp", "30,40", "--codec", codec, "--anchors", "simulcast", "--anchor-codecs", "h264")
+    succeeds("evaluate", array, "--output", tmp_path, *arguments, *FAST)
+    document = report(tmp_path)
+    names = [curve["name"] for curve in document["curves"]]
+    assert names == ["mvcodec", "simulcast", "simulcast-h264", "simulcast-b-h264"]
+    assert [curve["codec"] for curve in document["curves"]] == [codec, codec, "h264", "h264"]
+    for path in (tmp_path / "points").glob("*.mcap"):
+        assert read_info(path).header.codec == codec
+    h264 = [point["qp"] for point in document["curves"][2]["points"]]
+    assert h264 == ([25, 29] if codec == "av1" else [30, 40])
+
+
+def test_pictures_that_occur_twice_are_told(tmp_path: Path) -> None:
+    folder = write_array(tmp_path / "array", frames=2)
+    shutil.copy(folder / "r00_c00" / "000000.png", folder / "r01_c01" / "000001.png")
+    arguments = ("--qp", "30", "--anchors", "simulcast", "--anchor-codecs", "h264", *FAST)
+    done = mvcodec("evaluate", folder, "--output", tmp_path / "r", *arguments)
+    assert done.returncode == 0
+    assert "1 pictures of the input repeat others (such as r00_c00 frame 0 = r01_c01 frame 1)" in done.stderr
+    assert report(tmp_path / "r")["repeated_pictures"] == [
+        [{"view": [0, 0], "frame": 0}, {"view": [1, 1], "frame": 1}]
+    ]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--qp", "60"), "--qp: found 60, expected an integer, 1..51"),
+        (("--qp", "a"), "expected whole numbers such as 22,27,32,37"),
+        (("--anchors", "best"), "--anchors: found best, expected some of simulcast, pvs"),
+        (("--anchor-codecs", "vp9"), "codec: found vp9, expected h264, hevc, av1"),
+        (("--gop", "99"), "--gop: found 99, expected 1..10"),
+        (("--synthesizer", "magic"), "synthesizer: found magic"),
+        (("--frames", "7:"), "--frames: found 7:"),
+    ],
+)
+def test_bad_settings_are_told_before_anything_is_measured(
+    array: Path, tmp_path: Path, options: tuple[str, str], message: str
+) -> None:
+    arguments = ("--disparity-range", "0,8", *options)
+    assert message in fails(2, "evaluate", array, "--output", tmp_path / "r", *arguments)
+    assert not (tmp_path / "r").exists()
+
+
+def test_a_file_is_no_report(array: Path, tmp_path: Path) -> None:
+    (tmp_path / "r").write_text("x")
+    assert "a report is a folder" in fails(1, "evaluate", array, "--output", tmp_path / "r")
+
+
+def test_what_is_not_installed_is_named_with_its_extra(
+    array: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(evaluate, "find_spec", lambda _: None)
+    assert main(["evaluate", str(array), "--output", str(tmp_path / "r")]) == 1
+    assert "pip install 'mvcodec[evaluate]'" in capsys.readouterr().err
+
+
+def plot(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, ROOT / "tools" / "rd_plot.py", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_one_figure_of_several_reports(measured: Path, tmp_path: Path) -> None:
+    other = tmp_path / "second" / "report.json"
+    other.parent.mkdir()
+    document = report(measured)
+    other.write_text(json.dumps({**document, "input": "elsewhere"}))
+    first = measured / "report.json"
+    sizes = []
+    for number, reports in enumerate(([first], [first, other])):
+        done = plot(*reports, "-o", tmp_path / f"{number}.png")
+        assert done.returncode == 0, done.stderr
+        sizes.append(read_picture(tmp_path / f"{number}.png").shape)
+    assert sizes[1][0] > 1.5 * sizes[0][0], "an input of its own has panels of its own"
+    shutil.copytree(measured, tmp_path / "third")
+    done = plot(first, tmp_path / "third" / "report.json", "-o", tmp_path / "x.svg", "--anchors", "pvs-hevc")
+    assert done.returncode == 0, done.stderr
+    again = plot(first, tmp_path / "third" / "report.json", "-o", tmp_path / "y.svg", "--anchors", "pvs-hevc")
+    assert again.returncode == 0
+    assert (tmp_path / "x.svg").read_bytes() == (tmp_path / "y.svg").read_bytes()
+
+
+def test_plot_refuses_what_it_cannot_read_or_write(measured: Path, tmp_path: Path) -> None:
+    (tmp_path / "x.json").write_text("[]")
+    first = measured / "report.json"
+    for arguments, code, message in (
+        ((tmp_path / "none.json", "-o", tmp_path / "x.svg"), 1, "expected a report.json"),
+        ((tmp_path / "x.json", "-o", tmp_path / "x.svg"), 1, "JSON of another kind"),
+        ((first, "-o", tmp_path / "x.txt"), 2, "expected a name that ends in .svg"),
+        ((first, "-o", tmp_path / "no" / "x.svg"), 1, "cannot be written"),
+        (
+            (first, "-o", tmp_path / "x.svg", "--anchors", "none"),
+            2,
+            "--anchors: found none, expected some of",
+        ),
+    ):
+        done = plot(*arguments)
+        assert (done.returncode, len(done.stderr.splitlines())) == (code, 1), done.stderr
+        assert message in done.stderr
