@@ -136,7 +136,7 @@ def test_threads_share_one_renderer() -> None:
         ("reach_px", 0.49, "0.5..1.0"),
         ("reach_px", 1.01, "0.5..1.0"),
         ("spread", 0.0, "0.001..1000"),
-        ("edge_trust", 1.5, "0.0..1.0"),
+        ("edge_trust", 1.5, "0.001..1.0"),
         ("sharpness", 0.1, "-1.0..0.0"),
         ("hole_reach_px", 0, "1..4096"),
         ("tolerance_px", float("nan"), "0.001..1000"),

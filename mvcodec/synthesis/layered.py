@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import cv2
@@ -38,7 +39,7 @@ class LayeredSettings:
         reach_px: how far a moved pixel covers its surroundings, px, 0.5..1.
         spread: cells; a camera at distance b counts 1 / (spread + b^2), so that more cameras are
             averaged (less noise, more blur) with a larger one, above 0.
-        edge_trust: weight of pixels fetched at a camera's contours, 0..1.
+        edge_trust: weight of pixels fetched at a camera's contours, above 0 and at most 1.
         sharpness: Keys' parameter a of the cubic fetch, -1..0.
         hole_reach_px: how far holes are painted from, px, at least 1.
 
@@ -60,7 +61,7 @@ class LayeredSettings:
             ("ratio", 1.0, 1e3),
             ("reach_px", 0.5, 1.0),
             ("spread", 1e-3, 1e3),
-            ("edge_trust", 0.0, 1.0),
+            ("edge_trust", 1e-3, 1.0),
             ("sharpness", -1.0, 0.0),
             ("hole_reach_px", 1, 4096),
         ):
@@ -88,13 +89,13 @@ class _Sources:
         self._ready: set[Position] = set()
         self._lock = threading.Lock()
 
-    def indices(self, cameras: Sequence[Position], tolerance_px: float) -> NDArray[np.int64]:
-        """Prepare these cameras; their places in the arrays."""
+    def indices(self, cameras: Sequence[Position], tolerance_px: float, pool: Executor) -> NDArray[np.int64]:
+        """Prepare these cameras, side by side; their places in the arrays."""
         with self._lock:
-            for camera in cameras:
-                if camera not in self._ready:
-                    self._prepare(camera, tolerance_px)
-                    self._ready.add(camera)
+            missing = [camera for camera in cameras if camera not in self._ready]
+            for _ in pool.map(partial(self._prepare, tolerance_px=tolerance_px), missing):
+                pass
+            self._ready.update(missing)
         return np.array([self.decoded.array.real.index(camera) for camera in cameras])
 
     def _prepare(self, camera: Position, tolerance_px: float) -> None:
@@ -149,7 +150,7 @@ class Layered:
         shifts = np.array([array.shift_per_disparity(camera, viewpoint) for camera in cameras], np.float32)
         weight = np.array([weights[camera] for camera in cameras], np.float32)
         sources = self._prepared(decoded)
-        places = sources.indices(cameras, self.settings.tolerance_px)
+        places = sources.indices(cameras, self.settings.tolerance_px, self._pool)
         disparity = self._view_disparity(sources, places, shifts, weight)
         pixels, seen_by = self._colour(sources, places, shifts, weight, disparity)
         return RenderedView(viewpoint, pixels, disparity, seen_by)
