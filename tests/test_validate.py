@@ -22,6 +22,7 @@ CONFORMANCE = sorted((Path(__file__).parent / "conformance").glob("*.mcap"))
 BIN = Path(sys.executable).parent
 DOCTOR, FRAMES = BIN / "pymcap-cli", BIN / "mcap-frames"
 GRAVE = ("error", "warning")
+CLEAN = ("clean", "odd", "slow", "halved")
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +34,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "clean.mcap").write_bytes(small_file())
     (folder / "odd.mcap").write_bytes(written(encode(make_array(33, 17, fps=25.0), 30, qp=20)))
     (folder / "slow.mcap").write_bytes(written(coded_sets(5, 1, fps=0.5)))
+    halved = encode(make_array(96, 64, rows=1, cols=2), 12, gop=5, disparity_scale=2)
+    (folder / "halved.mcap").write_bytes(written(halved))
     return folder
 
 
@@ -44,7 +47,7 @@ def test_what_the_encoder_writes_is_clean(codec: str, tmp_path: Path) -> None:
 
 
 def test_files_of_earlier_versions_are_clean(folder: Path) -> None:
-    for path in (*CONFORMANCE, folder / "clean.mcap", folder / "odd.mcap", folder / "slow.mcap"):
+    for path in (*CONFORMANCE, *(folder / f"{name}.mcap" for name in CLEAN)):
         assert validate(path) == [], path
 
 
@@ -142,13 +145,13 @@ def _compare(folder: Path, names: list[str], report: Path) -> set[str]:
     issues = _frames_check([path for path in paths if path.stem not in BROKEN_CONTAINERS], report)
     theirs |= {name for name, found in issues.items() if found}
     assert theirs <= {path.stem for path in paths if validate(path)}
-    assert not {"clean", "odd", "slow"} & theirs
+    assert not {*CLEAN} & theirs
     return theirs
 
 
 def test_independent_checkers_agree(folder: Path, tmp_path: Path) -> None:
     """They find our files clean; and what they find fault with, we do too."""
-    names = ["clean", "odd", "chunk", "missing_set", "missing_keyframe"]
+    names = ["clean", "halved", "chunk", "missing_set", "missing_keyframe"]
     assert _compare(folder, names, tmp_path / "r.json") == {"chunk", "missing_set", "missing_keyframe"}
 
 

@@ -142,16 +142,26 @@ def _field_names(fields: Fields, key: str, pattern: str, allowed: set[str]) -> s
     return names
 
 
+def read_calibration(path: Path) -> Calibration:
+    """Read a JSON file with the fields of `array.json`'s calibration.
+
+    Raises:
+        InputError: unreadable, malformed, or a field that is missing or wrong (named).
+    """
+    return _calibration_of(Fields.load(path))
+
+
 def _calibration(fields: Fields) -> Calibration | None:
-    if "calibration" not in fields:
-        return None
-    inner = fields.inner("calibration")
+    return _calibration_of(fields.inner("calibration")) if "calibration" in fields else None
+
+
+def _calibration_of(inner: Fields) -> Calibration:
     fx_px, fy_px, cx_px, cy_px, baseline_m = (inner.number(key) for key in _CALIBRATION_KEYS)
     d_inf_px = inner.number("d_inf_px_per_step", 0.0)
     try:
         return Calibration(fx_px, fy_px, cx_px, cy_px, baseline_m, d_inf_px)
     except SettingError as error:
-        raise InputError(fields.source, f"{error.setting} = {error.found}", error.expected) from None
+        raise InputError(inner.source, f"{error.setting} = {error.found}", error.expected) from None
 
 
 def _disparity_range(fields: Fields) -> tuple[float, float] | None:

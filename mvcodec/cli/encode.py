@@ -11,6 +11,7 @@ from pathlib import Path
 
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource, open_input, resolve_frames
+from mvcodec.capture.manifest import read_calibration
 from mvcodec.cli.arguments import (
     add_disparity,
     add_frames,
@@ -18,11 +19,13 @@ from mvcodec.cli.arguments import (
     disparity_range,
     pair_of_sizes,
 )
+from mvcodec.cli.encode_stream import Unfinished, add_stream_arguments, encode_stream, is_stream, open_target
 from mvcodec.cli.info import document, summary
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.progress import progress
-from mvcodec.cli.safety import add_chunk_ms
-from mvcodec.container import McapWriter, read_info
+from mvcodec.cli.safety import add_chunk_ms, add_on_error
+from mvcodec.cli.standard_streams import STANDARD
+from mvcodec.container import read_info
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
 from mvcodec.frames import FrameSet
@@ -48,10 +51,6 @@ OPTIONS = {
 """The encoder's settings as the user wrote them."""
 
 
-class Unfinished(MvCodecError):
-    """Encoding ended early; what was written is a proper file."""
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``encode``."""
     default = EncoderConfig()
@@ -60,9 +59,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="+",
         metavar="INPUT",
-        help="an array folder, or R*C videos in row order with --grid",
+        help="an array folder, R*C videos in row order with --grid, or a recording with --topics: an .mcap"
+        " file or - for standard input",
     )
-    parser.add_argument("output", type=Path, metavar="OUT.mcap")
+    parser.add_argument("output", type=Path, metavar="OUT.mcap", help="or - for standard output")
     parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
     parser.add_argument(
         "--real",
@@ -107,7 +107,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="px between neighbouring real cameras; auto: estimated whatever the input states"
         " (default: estimated within what it states)",
     )
+    parser.add_argument(
+        "--calibration", type=Path, metavar="FILE", help="JSON with the calibration as in array.json"
+    )
     add_chunk_ms(parser)
+    add_on_error(parser, "stop")
+    add_stream_arguments(parser)
     add_frames(parser, "frames of the input to code")
     add_output_options(parser, "print what the file holds as JSON")
 
@@ -115,16 +120,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Encode; leaves no output where nothing was encoded, a proper one where something was."""
     _check_output(arguments.output, arguments.input)
-    source = open_input(arguments.input, grid=arguments.grid, real=arguments.real)
-    chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
-    config = _config(source.array, arguments)
-    if not source.array.calibration.given:
-        text = (
-            f"{source.name}: no calibration given; nominal values stand in (f = picture width, 0.1 m a step)"
-        )
-        warnings.warn(text, MvCodecWarning, stacklevel=2)
-    range_px = find_range(source, chosen, arguments.disparity_range)
-    _encode(source, chosen, replace(config, disparity_range_px=range_px), arguments)
+    if is_stream(arguments):
+        encode_stream(arguments, lambda array: _config(array, arguments))
+    else:
+        _encode_files(arguments)
+    if str(arguments.output) == STANDARD:
+        return
     info = read_info(arguments.output)
     if arguments.json:
         print(json.dumps(document(info)))
@@ -132,13 +133,35 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"{arguments.output}: {summary(info)}")
 
 
-def _encode(source: ArraySource, chosen: range, config: EncoderConfig, arguments: argparse.Namespace) -> None:
-    writer = McapWriter(arguments.output, arguments.chunk_ms)
+def _encode_files(arguments: argparse.Namespace) -> None:
+    source = open_input(arguments.input, grid=arguments.grid, real=arguments.real)
+    chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
+    array = source.array
+    if arguments.calibration is not None:
+        array = replace(array, calibration=read_calibration(arguments.calibration))
+    config = _config(array, arguments)
+    if not array.calibration.given:
+        text = (
+            f"{source.name}: no calibration given; nominal values stand in (f = picture width, 0.1 m a step)"
+        )
+        warnings.warn(text, MvCodecWarning, stacklevel=2)
+    range_px = find_range(source, chosen, arguments.disparity_range)
+    _encode(source, array, chosen, replace(config, disparity_range_px=range_px), arguments)
+
+
+def _encode(
+    source: ArraySource,
+    array: CameraArray,
+    chosen: range,
+    config: EncoderConfig,
+    arguments: argparse.Namespace,
+) -> None:
+    writer = open_target(arguments)
     try:
         with (
             deferred_interrupt() as interrupted,
             writer,
-            Encoder(source.array, config) as encoder,
+            Encoder(array, config) as encoder,
             progress("encode", len(chosen), quiet=arguments.quiet) as bar,
         ):
             for frame_set in source.frame_sets(slice(chosen.start, chosen.stop)):
@@ -156,6 +179,8 @@ def _encode(source: ArraySource, chosen: range, config: EncoderConfig, arguments
 
 
 def _check_output(output: Path, inputs: Sequence[Path]) -> None:
+    if str(output) == STANDARD:
+        return
     if output.resolve() in [path.resolve() for path in inputs]:
         raise SettingError("OUT", output, "another file than INPUT")
     if output.suffix.lower() != SUFFIX:

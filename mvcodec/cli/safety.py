@@ -49,9 +49,8 @@ def add_chunk_ms(parser: argparse.ArgumentParser) -> None:
         "--chunk-ms",
         type=_chunk_ms,
         metavar="N",
-        default=CHUNK_MS,
         help="stream time that waits before it is written, which is what a power cut can lose;"
-        " 0 writes each frame set at once (default: %(default)s)",
+        f" 0 writes each frame set at once (default: {CHUNK_MS}, on standard output 0)",
     )
 
 

@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex, Message, MessageIndex, Metadata
+from mcap.records import Channel, ChunkIndex, Message, MessageIndex, Metadata, Schema
 
 from mvcodec.container.exact_file import ExactFile
 from mvcodec.container.file_index import FileIndex, read_index
@@ -27,6 +27,7 @@ from mvcodec.container.records import (
     parse_channel,
     parse_chunk,
     parse_message,
+    parse_schema,
     read_record,
     unpack,
 )
@@ -69,6 +70,7 @@ class ChunkReader:
         self._file = ExactFile(file)
         self._name, self._limits, self._on_damage = name, limits, on_damage
         self._channels: dict[int, Channel] = {}
+        self._schemas: dict[int, Schema] = {}
         self._fallback: dict[int, str] = {}
         self._last_time_ns: int | None = None
         self._damaged = False
@@ -77,6 +79,7 @@ class ChunkReader:
         self._index = self._read_index() if file.seekable() else None
         if self._index is not None:
             self._channels.update(self._index.channels)
+            self._schemas.update(self._index.schemas)
 
     @property
     def indexed(self) -> bool:
@@ -97,6 +100,12 @@ class ChunkReader:
     def topics(self) -> set[str]:
         """The topics seen so far: all of an indexed file."""
         return {channel.topic for channel in self._channels.values()}
+
+    def schema_of(self, topic: str) -> tuple[str, str]:
+        """Name of the schema and message encoding of a topic seen so far; empty where there is none."""
+        channel = next((channel for channel in self._channels.values() if channel.topic == topic), None)
+        schema = None if channel is None else self._schemas.get(channel.schema_id)
+        return "" if schema is None else schema.name, "" if channel is None else channel.message_encoding
 
     def chunks(self, first: int = 0) -> Iterator[list[TopicMessage]]:
         """The chunks in file order; from chunk `first`, if the file is indexed."""
@@ -206,6 +215,9 @@ class ChunkReader:
             if opcode == Opcode.CHANNEL:
                 channel = parse_channel(content)
                 self._channels[channel.id] = channel
+            elif opcode == Opcode.SCHEMA:
+                schema = parse_schema(content)
+                self._schemas[schema.id] = schema
             elif opcode == Opcode.METADATA:
                 self._note_channels(content)
             elif opcode == Opcode.MESSAGE:
@@ -236,6 +248,8 @@ class ChunkReader:
         for item in chunk_records(data, whole=whole):
             if isinstance(item, Channel):
                 self._channels[item.id] = item
+            elif isinstance(item, Schema):
+                self._schemas[item.id] = item
             elif topic := self._topic(item):
                 messages.append((topic, item))
         if messages:

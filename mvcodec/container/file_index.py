@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex
+from mcap.records import Channel, ChunkIndex, Schema
 
 from mvcodec.container.exact_file import ExactFile
 from mvcodec.container.limits import Limits
-from mvcodec.container.records import DAMAGE, HEAD, MAGIC, RecordError, parse_channel
+from mvcodec.container.records import DAMAGE, HEAD, MAGIC, RecordError, parse_channel, parse_schema
 
 _FOOTER = struct.Struct("<QQI")
 """Start of the summary, start of its offsets, CRC of the summary up to this field."""
@@ -28,10 +28,12 @@ class FileIndex:
 
     Attributes:
         channels: by number.
+        schemas: by number.
         chunks: in the order of the file.
     """
 
     channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, Schema] = field(default_factory=dict)
     chunks: list[ChunkIndex] = field(default_factory=list)
 
 
@@ -85,6 +87,9 @@ def _parse(summary: bytes, end: int) -> FileIndex | None:
         if opcode == Opcode.CHANNEL:
             channel = parse_channel(content)
             index.channels[channel.id] = channel
+        elif opcode == Opcode.SCHEMA:
+            schema = parse_schema(content)
+            index.schemas[schema.id] = schema
         elif opcode == Opcode.CHUNK_INDEX:
             index.chunks.append(_chunk_index(content, end))
     index.chunks.sort(key=lambda chunk: chunk.chunk_start_offset)

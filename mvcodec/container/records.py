@@ -12,7 +12,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Message
+from mcap.records import Channel, Message, Schema
 
 from mvcodec.container.exact_file import ExactFile
 from mvcodec.container.limits import Limits
@@ -212,8 +212,8 @@ def chunk_places(data: bytes, *, whole: bool = True) -> Iterator[tuple[int, byte
         raise RecordError("a chunk that ends inside a record")
 
 
-def chunk_records(data: bytes, *, whole: bool = True) -> Iterator[Channel | Message]:
-    """The channels and messages of an unpacked chunk.
+def chunk_records(data: bytes, *, whole: bool = True) -> Iterator[Schema | Channel | Message]:
+    """The schemas, channels and messages of an unpacked chunk.
 
     Raises:
         RecordError: a record is damaged; with `whole` false, the end is only where it breaks off.
@@ -221,6 +221,8 @@ def chunk_records(data: bytes, *, whole: bool = True) -> Iterator[Channel | Mess
     for opcode, content, _ in chunk_places(data, whole=whole):
         if opcode == Opcode.CHANNEL:
             yield parse_channel(content)
+        elif opcode == Opcode.SCHEMA:
+            yield parse_schema(content)
         elif opcode == Opcode.MESSAGE:
             yield parse_message(content)
 
@@ -232,6 +234,15 @@ def parse_channel(content: bytes) -> Channel:
     except DAMAGE as error:
         raise RecordError(f"a damaged channel ({error})") from None
     return channel
+
+
+def parse_schema(content: bytes) -> Schema:
+    """A schema record."""
+    try:
+        schema: Schema = Schema.read(ReadDataStream(io.BytesIO(content)))
+    except DAMAGE as error:
+        raise RecordError(f"a damaged schema ({error})") from None
+    return schema
 
 
 def parse_message(content: bytes) -> Message:

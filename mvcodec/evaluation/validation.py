@@ -10,8 +10,9 @@ from mvcodec.container.finding import Finding, error, warning
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.message_check import MessageCheck
 from mvcodec.errors import InputError, StreamError
-from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track
+from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind
 from mvcodec.video.colour import even_size
+from mvcodec.video.map_size import coded_size
 from mvcodec.video.unit_rules import UNIT_RULES, UnitRules
 
 MAX_FINDINGS = 1000
@@ -121,13 +122,17 @@ class _StreamCheck:
     def _start(self, header: StreamHeader, data: bytes) -> None:
         self._header, self._header_data = header, data
         self._messages = MessageCheck(header, self._add)
-        size = even_size(header.array.width, header.array.height)
+        width, height = header.array.width, header.array.height
+        sizes = {
+            TrackKind.TEXTURE: even_size(width, height),
+            TrackKind.DISPARITY: coded_size(width, height, header.disparity_scale),
+        }
         rules = UNIT_RULES.get(header.codec)
         if rules is None:
             self._add(error("codec", f"unknown codec {header.codec!r}", HEADER_TRACK.topic))
         self._tracks = {track.topic: track for track in header.tracks}
         if rules is not None:
-            self._rules = {track: rules(track.kind, size) for track in header.tracks}
+            self._rules = {track: rules(track.kind, sizes[track.kind]) for track in header.tracks}
         self._assembler.start(header.tracks)
 
     def _check_set(self, message: CheckedMessage) -> None:

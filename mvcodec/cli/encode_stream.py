@@ -1,0 +1,160 @@
+"""``mvcodec encode`` of recordings and live streams, whose length nobody knows."""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO
+
+from mvcodec.array import CameraArray
+from mvcodec.capture.manifest import read_calibration
+from mvcodec.capture.recording import Recording, RecordingSettings
+from mvcodec.cli.interrupt import deferred_interrupt
+from mvcodec.cli.progress import progress
+from mvcodec.cli.standard_streams import STANDARD, standard_input, standard_output
+from mvcodec.container import McapWriter
+from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError, StreamError
+from mvcodec.frames import FrameSet
+from mvcodec.live import LiveEncoding
+
+SUFFIX = ".mcap"
+
+
+class Unfinished(MvCodecError):
+    """Encoding ended early; what was written is a proper file."""
+
+
+def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options that recordings need."""
+    group = parser.add_argument_group("recordings and live streams (an .mcap file, or -)")
+    group.add_argument(
+        "--topics",
+        metavar="T,T;T,T",
+        help="the video or image topic of every view: rows separated by ; or one list with --grid",
+    )
+    group.add_argument("--fps", type=float, metavar="N", help="nominal frame rate (default: from the times)")
+    group.add_argument(
+        "--tolerance-ms",
+        type=float,
+        metavar="N",
+        help="how far apart pictures of one frame set may be taken (default: a quarter of a frame's time)",
+    )
+    group.add_argument(
+        "--when-behind",
+        choices=("drop", "block"),
+        default="block",
+        help="where coding or the reader of OUT is too slow: leave frame sets out, or let INPUT wait"
+        " (default: %(default)s)",
+    )
+
+
+def is_stream(arguments: argparse.Namespace) -> bool:
+    """Whether the input is a recording or a stream."""
+    inputs: list[Path] = arguments.input
+    return len(inputs) == 1 and (str(inputs[0]) == STANDARD or inputs[0].suffix.lower() == SUFFIX)
+
+
+def open_target(arguments: argparse.Namespace) -> McapWriter:
+    """The writer of OUT; frame sets go to standard output one by one."""
+    if str(arguments.output) == STANDARD:
+        return McapWriter(standard_output(), 0 if arguments.chunk_ms is None else arguments.chunk_ms)
+    return McapWriter(arguments.output, *(() if arguments.chunk_ms is None else (arguments.chunk_ms,)))
+
+
+def encode_stream(arguments: argparse.Namespace, make_config: Callable[[CameraArray], EncoderConfig]) -> None:
+    """Code frame sets as they come."""
+    first, stop = _frames(arguments.frames)
+    with _opened(arguments) as source:
+        config = make_config(source.array)
+        span = arguments.disparity_range
+        if isinstance(span, tuple):
+            config = replace(config, disparity_range_px=span)
+        if not source.array.calibration.given:
+            text = f"{source.name}: no calibration given; nominal values stand in"
+            warnings.warn(text, MvCodecWarning, stacklevel=2)
+        _run(arguments, source, config, islice(source.frame_sets(), first, stop))
+
+
+def _run(
+    arguments: argparse.Namespace, source: Recording, config: EncoderConfig, frame_sets: Iterator[FrameSet]
+) -> None:
+    writer = open_target(arguments)
+    encoder = Encoder(source.array, config)
+    live = LiveEncoding(encoder, writer, arguments.when_behind)
+    try:
+        with (
+            deferred_interrupt() as interrupted,
+            writer,
+            encoder,
+            progress("encode", None, quiet=arguments.quiet) as bar,
+        ):
+            live.run(frame_sets, interrupted, bar.update)
+            writer.note({"dropped": str(live.dropped)})
+    except (MvCodecError, OSError) as error:
+        if not writer.frame_count or str(arguments.output) == STANDARD:
+            raise
+        raise Unfinished(f"{error}; {arguments.output} holds {writer.frame_count} frame sets") from error
+    if not writer.frame_count:
+        raise InputError(source.name, "no frame set of all cameras", "one at least")
+    if live.dropped:
+        text = f"{source.name}: {live.dropped} frame sets dropped, since they came faster than they left"
+        warnings.warn(text, MvCodecWarning, stacklevel=2)
+
+
+@contextmanager
+def _opened(arguments: argparse.Namespace) -> Iterator[Recording]:
+    settings = RecordingSettings(
+        topics=_topic_grid(arguments),
+        real=arguments.real,
+        fps=arguments.fps,
+        tolerance_ms=arguments.tolerance_ms,
+        calibration=None if arguments.calibration is None else read_calibration(arguments.calibration),
+    )
+    path: Path = arguments.input[0]
+    on_damage = _warn if arguments.on_error == "skip" else None
+    if str(path) == STANDARD:
+        yield Recording(standard_input(), "standard input", settings, on_damage=on_damage)
+        return
+    try:
+        file: BinaryIO = path.open("rb")
+    except OSError as error:
+        raise InputError(path, error.strerror, "a file that can be read") from None
+    with file:
+        yield Recording(file, str(path), settings, on_damage=on_damage)
+
+
+def _topic_grid(arguments: argparse.Namespace) -> tuple[tuple[str, ...], ...]:
+    if arguments.topics is None:
+        expected = "the topic of every view, such as '/a,/b;/c,/d'"
+        raise SettingError("--topics", "nothing", expected)
+    rows = tuple(
+        tuple(topic.strip() for topic in row.split(",")) for row in arguments.topics.strip(";").split(";")
+    )
+    if arguments.grid is None:
+        return rows
+    names = [name for row in rows for name in row]
+    if len(names) != arguments.grid[0] * arguments.grid[1]:
+        found = f"{len(names)} topics"
+        raise SettingError("--topics", found, f"{arguments.grid[0]}x{arguments.grid[1]} as --grid says")
+    cols = arguments.grid[1]
+    return tuple(tuple(names[at : at + cols]) for at in range(0, len(names), cols))
+
+
+def _frames(frames: slice | None) -> tuple[int, int | None]:
+    start, stop = (0, None) if frames is None else (frames.start or 0, frames.stop)
+    if start < 0 or (stop is not None and stop <= start):
+        text = f"{'' if start == 0 else start}:{'' if stop is None else stop}"
+        raise SettingError(
+            "--frames", text, "A:B counted from the start, since the input's length is unknown"
+        )
+    return start, stop
+
+
+def _warn(error: StreamError) -> None:
+    warnings.warn(str(error), MvCodecWarning, stacklevel=3)
