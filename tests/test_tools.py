@@ -62,6 +62,25 @@ def test_benchmark_has_the_documented_form(array: Path) -> None:
     assert all(ratio > 0 for ratio in document["ratios"].values())
 
 
+def test_benchmark_puts_other_maps_beside_the_default_ones(array: Path) -> None:
+    options = ("--data", array, "--what", "quality", "--synthesizer", "linear")
+    done = run("benchmark.py", *options, "--maps", "sgbm-h", "--json")
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)["sets"]["small"]
+    assert list(figures) == ["psnr_y", "ssim", "worst_psnr_y", "seconds_per_view", "maps"]
+    alone = run("benchmark.py", *options, "--matcher", "sgbm-h", "--json")
+    expected = json.loads(alone.stdout)["sets"]["small"]
+    for name in ("psnr_y", "ssim", "worst_psnr_y"):
+        assert figures["maps"]["sgbm-h"][name] == expected[name] != figures[name]
+    header, line = done.stderr.splitlines()
+    assert "sgbm-h maps" in header
+    assert f"{figures['psnr_y']:.2f}" in line.split("|")[0]
+    assert f"{expected['psnr_y']:.2f}" in line.split("|")[1]
+    wrong = run("benchmark.py", *options, "--maps", "sgmb")
+    assert wrong.returncode == 2
+    assert "invalid choice: 'sgmb'" in wrong.stderr
+
+
 def test_benchmark_skips_what_has_no_virtual_view_and_says_so(array: Path, tmp_path: Path) -> None:
     shutil.copytree(array, tmp_path / "with")
     write_array(tmp_path / "pair", 1, 2, 1)
@@ -69,6 +88,21 @@ def test_benchmark_skips_what_has_no_virtual_view_and_says_so(array: Path, tmp_p
     assert done.returncode == 0, done.stderr
     assert "pair: skipped, its 1 x 2 grid has no virtual view" in done.stdout
     assert run("benchmark.py", "--data", tmp_path, "--sets", "other").returncode == 2
+
+
+def test_error_shares_add_up(array: Path) -> None:
+    done = run("error_shares.py", "--data", array.parent, "--json")
+    assert done.returncode == 0, done.stderr
+    shares = json.loads(done.stdout)["sets"]["small"]
+    assert list(shares) == ["regions", "worst_share", "brightness_share"]
+    assert list(shares["regions"]) == ["filled", "edges", "flat", "texture"]
+    for name in ("share", "error_share"):
+        assert sum(region[name] for region in shares["regions"].values()) == pytest.approx(1)
+    texture = shares["regions"]["texture"]
+    assert f"{texture['share']:.1%} {texture['error_share']:6.1%}" in done.stderr
+    done = run("error_shares.py", "--data", array / "none")
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")

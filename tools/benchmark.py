@@ -1,12 +1,14 @@
 """How good and how fast: synthesis quality on real arrays, and speed against stock code in the same run.
 
     python tools/benchmark.py --data DIR [--sets A,B] [--what quality|speed] [--matcher NAME]
-                              [--synthesizer NAME] [--json]
+                              [--maps NAME] [--synthesizer NAME] [--json]
 
 DIR is an array folder or a folder of them. Quality: the corner cameras go in uncoded, the disparity range is
 estimated, every virtual view of frame 0 is rendered and its luma compared with the original's (of a 17 x 17
-grid every 4th row and column, of a 9 x 9 one the views whose row + col is divisible by 5). Speed: see
-speed_ratios.py beside this file; it needs no --data (then: the sample scene). Without --what, both.
+grid every 4th row and column, of a 9 x 9 one the views whose row + col is divisible by 5). With --maps they
+are rendered once more from that matcher's maps, to judge renderer and maps apart (sgbm-h: plain SGBM,
+horizontal partner only). Speed: see speed_ratios.py beside this file; it needs no --data (then: the sample
+scene). Without --what, both.
 """
 
 from __future__ import annotations
@@ -27,10 +29,10 @@ from mvcodec.capture import ArraySource, open_input
 from mvcodec.capture.scene import SceneSettings
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
 from mvcodec.evaluation.quality import QualityMeter
-from mvcodec.frames import DecodedSet
+from mvcodec.frames import DecodedSet, FrameSet
 from mvcodec.output.sample import write_sample
 from mvcodec.stereo.disparity_range import estimate_range
-from mvcodec.stereo.table import make_matcher
+from mvcodec.stereo.table import MATCHERS, make_matcher
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.table import make_synthesizer
 
@@ -66,16 +68,23 @@ def scored_views(array: CameraArray) -> list[Position]:
     return virtual
 
 
-def measure_quality(source: ArraySource, matcher: str, synthesizer: Synthesizer) -> SetFigures:
-    """Match the uncoded corners of frame 0, render the scored views, compare them."""
-    array, views = source.array, scored_views(source.array)
-    (originals,) = source.frame_sets(slice(0, 1), [*array.real, *views])
+def match_corners(source: ArraySource, matcher: str) -> tuple[FrameSet, DecodedSet, float]:
+    """Frame 0 of real and scored views, its uncoded corners with their maps, and seconds of matching."""
+    array = source.array
+    (originals,) = source.frame_sets(slice(0, 1), [*array.real, *scored_views(array)])
     pictures = {camera: originals.pictures[camera] for camera in array.real}
     range_px = estimate_range(array, [originals], None)
     started = time.perf_counter()
     maps = make_matcher(matcher).match(array, pictures, range_px)
-    matching_seconds = time.perf_counter() - started
+    seconds = time.perf_counter() - started
     decoded = DecodedSet(array, originals.index, originals.time_ns, pictures, maps, range_px)
+    return originals, decoded, seconds
+
+
+def measure_quality(source: ArraySource, matcher: str, synthesizer: Synthesizer) -> SetFigures:
+    """Match the uncoded corners of frame 0, render the scored views, compare them."""
+    array, views = source.array, scored_views(source.array)
+    originals, decoded, matching_seconds = match_corners(source, matcher)
     # The first view pays for compilation and for what the synthesizer keeps of a decoded set.
     synthesizer.render(decoded, Viewpoint(*views[0]))
     meter, render_seconds = QualityMeter(array.real), 0.0
@@ -88,7 +97,8 @@ def measure_quality(source: ArraySource, matcher: str, synthesizer: Synthesizer)
     psnr, ssim, worst = result.psnr_y.all, result.ssim.all, result.psnr_y.worst
     if psnr is None or ssim is None or worst is None:
         raise InputError(source.name, "no virtual view", "at least one")
-    return SetFigures(psnr, ssim, worst, render_seconds / len(views), matching_seconds, range_px, len(views))
+    seconds_per_view, range_px = render_seconds / len(views), decoded.disparity_range_px
+    return SetFigures(psnr, ssim, worst, seconds_per_view, matching_seconds, range_px, len(views))
 
 
 def find_sets(data: Path, names: Sequence[str] | None) -> dict[str, Path]:
@@ -108,24 +118,28 @@ def find_sets(data: Path, names: Sequence[str] | None) -> dict[str, Path]:
 def quality_table(sets: dict[str, ArraySource], arguments: argparse.Namespace) -> dict[str, Any]:
     """Measure every set; a line for each as it is done."""
     synthesizer = make_synthesizer(arguments.synthesizer)
-    figures = {}
-    say("set          Y-PSNR dB  worst   SSIM  s/view s match views  range px", arguments)
+    figures: dict[str, Any] = {}
+    header = f"{'set':12} {'Y-PSNR dB':>9} {'worst':>6} {'SSIM':>6}"
+    if arguments.maps:
+        header += f" | {arguments.maps + ' maps':>12} {'worst':>6} {'SSIM':>6} |"
+    say(f"{header}  s/view s match views  range px", arguments)
     for name, source in sets.items():
         result = measure_quality(source, arguments.matcher, synthesizer)
         figures[name] = result.to_json()
+        line = f"{name:12} {result.psnr_y:9.2f} {result.worst_psnr_y:6.2f} {result.ssim:6.4f}"
+        if arguments.maps:
+            other = measure_quality(source, arguments.maps, synthesizer)
+            figures[name]["maps"] = {arguments.maps: other.to_json()}
+            line += f" | {other.psnr_y:12.2f} {other.worst_psnr_y:6.2f} {other.ssim:6.4f} |"
         low, high = result.range_px
-        say(
-            f"{name:12} {result.psnr_y:9.2f} {result.worst_psnr_y:6.2f} {result.ssim:6.4f}"
-            f" {result.seconds_per_view:7.3f} {result.matching_seconds:7.3f} {result.views:5}"
-            f"  {low:g}..{high:g}",
-            arguments,
-        )
+        line += f" {result.seconds_per_view:7.3f} {result.matching_seconds:7.3f} {result.views:5}"
+        say(f"{line}  {low:g}..{high:g}", arguments)
     return figures
 
 
 def speed_table(source: ArraySource, arguments: argparse.Namespace) -> dict[str, float]:
     """Measure the ratios on one array."""
-    from speed_ratios import RATIOS, measure_ratios  # noqa: PLC0415 - quality needs no codec
+    from speed_ratios import RATIOS, measure_ratios
 
     say(f"speed on {source.name}, {source.array.width} x {source.array.height}", arguments)
     ratios = {}
@@ -194,6 +208,9 @@ def main() -> int:
     parser.add_argument("--sets", type=lambda text: text.split(","), metavar="A,B")
     parser.add_argument("--what", choices=("quality", "speed"))
     parser.add_argument("--matcher", default="joint")
+    parser.add_argument(
+        "--maps", choices=MATCHERS, help="quality from another matcher's maps too, e.g. sgbm-h"
+    )
     parser.add_argument("--synthesizer", default="layered")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()

@@ -68,7 +68,7 @@ def regions(truth: DisparityMap, partner: DisparityMap | None = None) -> Regions
     else:
         found = f"{truth.values_px.shape} and {partner.values_px.shape}"
         raise SettingError("regions", found, "truth maps of equal size")
-    return Regions(truth.values_px, seen, truth.valid, seen & _near_edges(truth))
+    return Regions(truth.values_px, seen, truth.valid, seen & near_edges(truth))
 
 
 def bad_pixels(scored: Regions, estimate_px: FloatMap, threshold_px: float = 1.0) -> BadPixels:
@@ -87,6 +87,24 @@ def bad_pixels(scored: Regions, estimate_px: FloatMap, threshold_px: float = 1.0
             for region in (scored.non_occluded, scored.all, scored.discontinuity)
         )
     )
+
+
+def near_edges(disparity: DisparityMap) -> Mask:
+    """Where known neighbours differ by more than 2 px, and 4 px around: bool (H, W).
+
+    Args:
+        disparity: px; only gaps between valid pixels count.
+    """
+    edges = np.zeros(disparity.valid.shape, np.uint8)
+    for axis in (0, 1):
+        gaps = np.abs(np.diff(disparity.values_px, axis=axis)) > GAP_PX
+        both_known = np.diff(disparity.valid.astype(np.int8), axis=axis) == 0
+        before, after = [slice(None)] * 2, [slice(None)] * 2
+        before[axis], after[axis] = slice(None, -1), slice(1, None)
+        gaps &= both_known & disparity.valid[tuple(after)]
+        edges[tuple(before)] |= gaps
+        edges[tuple(after)] |= gaps
+    return np.asarray(cv2.dilate(edges, np.ones((NEAR_EDGE_PX, NEAR_EDGE_PX), np.uint8)) > 0)
 
 
 def _confirmed(truth: DisparityMap, partner: DisparityMap) -> Mask:
@@ -108,16 +126,3 @@ def _unhidden(truth: DisparityMap) -> Mask:
         nearer = nearness[known] > nearness[:, None] + AGREEMENT_PX
         seen[row] &= ~(close & nearer).any(axis=1)
     return np.asarray(seen)
-
-
-def _near_edges(truth: DisparityMap) -> Mask:
-    edges = np.zeros(truth.valid.shape, np.uint8)
-    for axis in (0, 1):
-        gaps = np.abs(np.diff(truth.values_px, axis=axis)) > GAP_PX
-        both_known = np.diff(truth.valid.astype(np.int8), axis=axis) == 0
-        before, after = [slice(None)] * 2, [slice(None)] * 2
-        before[axis], after[axis] = slice(None, -1), slice(1, None)
-        gaps &= both_known & truth.valid[tuple(after)]
-        edges[tuple(before)] |= gaps
-        edges[tuple(after)] |= gaps
-    return np.asarray(cv2.dilate(edges, np.ones((NEAR_EDGE_PX, NEAR_EDGE_PX), np.uint8)) > 0)
