@@ -34,8 +34,12 @@ from mvcodec.video.table import find_codec
 
 WORKERS = 2
 
-DISPARITY_SHARE = 0.4
-"""The maps' share in bitrate mode; `default_disparity_qp` came to 0.5 on shop_v3 at QP 32, SGBM maps."""
+KEYFRAME_NS = 1_000_000_000
+"""A keyframe comes after this time at the latest, whatever the nominal frame rate says."""
+
+DISPARITY_SHARE = 0.12
+"""The maps' share in bitrate mode; at the best map QP it is 0.09 to 0.18 on shop_v3, 0.06 to 0.08 on shop_v4
+and 0.10 to 0.16 on the sample, for pictures of QP 27 to 35."""
 
 
 def default_gop(fps: float) -> int:
@@ -107,18 +111,24 @@ class EncoderConfig:
             return self.disparity_scale
         return default_disparity_scale(self.quality, self.codec, array.width, array.height)
 
-    def rate_of(self, kind: TrackKind, array: CameraArray) -> RateControl:
-        """The rate control of one track of a kind."""
-        if kind is TrackKind.DISPARITY and self.disparity_qp is not None:
+    def rate_of_pictures(self, array: CameraArray) -> RateControl:
+        """The rate control of one camera's pictures."""
+        if self.bitrate_kbps is None:
+            return RateControl(qp=self.qp, crf=self.crf)
+        return _share(self.bitrate_kbps, 1.0 if self.disparity_qp is not None else 1 - DISPARITY_SHARE, array)
+
+    def rate_of_maps(self, array: CameraArray, range_px: tuple[float, float]) -> RateControl:
+        """The rate control of one camera's maps; `range_px` is the header's."""
+        if self.disparity_qp is not None:
             return RateControl(qp=self.disparity_qp)
         if self.bitrate_kbps is not None:
-            maps = 0.0 if self.disparity_qp is not None else DISPARITY_SHARE
-            share = maps if kind is TrackKind.DISPARITY else 1 - maps
-            return RateControl(bitrate_kbps=max(self.bitrate_kbps * share / len(array.real), 1.0))
-        if kind is TrackKind.TEXTURE:
-            return RateControl(qp=self.qp, crf=self.crf)
+            return _share(self.bitrate_kbps, DISPARITY_SHARE, array)
         assert self.quality is not None
-        return RateControl(qp=default_disparity_qp(self.quality, self.scale_for(array), self.codec))
+        return RateControl(qp=default_disparity_qp(self.quality, self.scale_for(array), range_px, self.codec))
+
+
+def _share(kbps: float, share: float, array: CameraArray) -> RateControl:
+    return RateControl(bitrate_kbps=max(kbps * share / len(array.real), 1.0))
 
 
 class Encoder:
@@ -145,9 +155,11 @@ class Encoder:
         self._scale = self.config.scale_for(array)
         given = self.config.disparity_median
         self._median = MEDIANS[self._scale] if given is None else given
-        self._encoders = self._make_encoders()
+        size = even_size(array.width, array.height)
+        self._encoders = self._make_encoders(TrackKind.TEXTURE, size, self.config.rate_of_pictures(array))
         self._header: StreamHeader | None = None
         self._position = 0  # frame sets since the last keyframe, modulo the GOP
+        self._key_ns = 0
         self._last: FrameSet | None = None
         self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(WORKERS, "encode")
 
@@ -171,8 +183,11 @@ class Encoder:
         self._check(frames)
         if self._header is None:
             self._header = self._make_header(frames)
+            self._encoders |= self._make_map_encoders(self._header)
         # Should something fail below, the next frame set starts afresh with a keyframe.
         position, self._position = self._position, 0
+        if self._last is not None and frames.time_ns - self._key_ns >= KEYFRAME_NS:
+            position = 0  # frame sets came more slowly than their nominal rate
         jobs: dict[Track, Future[list[CodedPicture]]] = {}
         try:
             self._submit(self._pool, frames, position == 0, jobs)
@@ -180,6 +195,7 @@ class Encoder:
             wait(jobs.values())
         packets = [_packet(track, frames, job.result()) for track, job in jobs.items()]
         if position == 0:
+            self._key_ns = frames.time_ns
             head = Packet(HEADER_TRACK, frames.index, frames.time_ns, True, self._header.to_json())
             packets.insert(0, head)
         self._position = (position + 1) % self._gop
@@ -222,18 +238,17 @@ class Encoder:
     ) -> None:
         self.flush()
 
-    def _make_encoders(self) -> dict[Track, VideoEncoder]:
+    def _make_encoders(
+        self, kind: TrackKind, size: tuple[int, int], rate: RateControl
+    ) -> dict[Track, VideoEncoder]:
         array, codec = self.array, find_codec(self.config.codec)
-        sizes = {
-            TrackKind.TEXTURE: even_size(array.width, array.height),
-            TrackKind.DISPARITY: coded_size(array.width, array.height, self._scale),
-        }
-        encoders = {}
-        for kind, (width, height) in sizes.items():
-            rate = self.config.rate_of(kind, array)
-            settings = VideoSettings(kind, width, height, array.fps, self._gop, rate, self.config.preset)
-            encoders.update({Track(kind, camera): codec.encoder(settings) for camera in array.real})
-        return encoders
+        settings = VideoSettings(kind, *size, array.fps, self._gop, rate, self.config.preset)
+        return {Track(kind, camera): codec.encoder(settings) for camera in array.real}
+
+    def _make_map_encoders(self, header: StreamHeader) -> dict[Track, VideoEncoder]:
+        size = coded_size(self.array.width, self.array.height, self._scale)
+        rate = self.config.rate_of_maps(self.array, header.disparity_range_px)
+        return self._make_encoders(TrackKind.DISPARITY, size, rate)
 
     def _make_header(self, frames: FrameSet) -> StreamHeader:
         span = self.config.disparity_range_px
@@ -241,12 +256,11 @@ class Encoder:
             from mvcodec.stereo.disparity_range import estimate_range
 
             span = estimate_range(self.array, [frames], self.array.disparity_hint_px)
-        settings = self._settings_record()
+        settings = self._settings_record(self.config.rate_of_maps(self.array, span))
         return StreamHeader(self.array, span, self.config.codec, frames.index, settings, self._scale)
 
-    def _settings_record(self) -> dict[str, Any]:
+    def _settings_record(self, maps: RateControl) -> dict[str, Any]:
         config, codec = self.config, find_codec(self.config.codec)
-        maps = config.rate_of(TrackKind.DISPARITY, self.array)
         matcher = config.matcher if isinstance(config.matcher, str) else type(config.matcher).__name__
         record = {
             "qp": config.qp,

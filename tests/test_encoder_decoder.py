@@ -149,7 +149,7 @@ def test_each_push_returns_its_own_packets_at_once() -> None:
     header = StreamHeader.from_json(coded[5][0].data)
     assert header.array == ARRAY
     assert header.first_frame == 0
-    expected = {"qp": 20, "disparity_qp": 23, "gop": 5, "preset": "veryfast", "matcher": "RampMatcher"}
+    expected = {"qp": 20, "disparity_qp": 29, "gop": 5, "preset": "veryfast", "matcher": "RampMatcher"}
     assert expected.items() <= header.settings.items()
 
 
@@ -397,18 +397,19 @@ def test_default_gop_is_a_second_at_most(fps: float, gop: int) -> None:
 
 def test_maps_follow_the_pictures_quantiser() -> None:
     def map_qp(**changes: object) -> int | None:
-        return config(**changes).rate_of(TrackKind.DISPARITY, ARRAY).qp
+        return config(**changes).rate_of_maps(ARRAY, RANGE_PX).qp
 
-    assert map_qp(qp=20) == default_disparity_qp(20, 1)
-    assert map_qp(qp=None, crf=40.0) == map_qp(qp=40) == default_disparity_qp(40, 2)
-    assert map_qp(qp=40, disparity_scale=1) == default_disparity_qp(40, 1)
+    assert map_qp(qp=20) == default_disparity_qp(20, 1, RANGE_PX)
+    assert map_qp(qp=None, crf=40.0) == map_qp(qp=40) == default_disparity_qp(40, 2, RANGE_PX)
+    assert map_qp(qp=40, disparity_scale=1) == default_disparity_qp(40, 1, RANGE_PX)
     assert map_qp(disparity_qp=44) == 44
 
 
 def test_bit_rate_is_that_of_all_tracks_together() -> None:
     kbps = 800.0
+    given = config(qp=None, bitrate_kbps=kbps)
     rates = [
-        config(qp=None, bitrate_kbps=kbps).rate_of(kind, ARRAY).bitrate_kbps for kind in list(TrackKind)[1:]
+        rate.bitrate_kbps for rate in (given.rate_of_pictures(ARRAY), given.rate_of_maps(ARRAY, RANGE_PX))
     ]
     assert sum(4 * rate for rate in rates if rate is not None) == pytest.approx(kbps)
     info = read_info(io.BytesIO(encoded_file(ARRAY, 40, qp=None, bitrate_kbps=kbps)))

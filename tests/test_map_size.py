@@ -140,17 +140,22 @@ def test_model_halves_maps_of_coarse_pictures_only() -> None:
     assert scales == sorted(scales)
     assert set(scales) == {1, 2}
     assert default_disparity_scale(40, "h264", 960, 62) == 1
-    assert default_disparity_scale(None, "h264", 960, 640) == 1
+    assert default_disparity_scale(None, "h264", 960, 640) == 2
 
 
 @pytest.mark.parametrize(("codec", "top"), [("h264", 51), ("hevc", 51), ("av1", 63)])
 def test_model_quantises_small_maps_finer_and_stays_within_the_scale(codec: str, top: int) -> None:
     for scale in (1, 2):
-        qps = [default_disparity_qp(qp, scale, codec) for qp in range(1, top + 1)]
+        qps = [default_disparity_qp(qp, scale, (0.0, 64.0), codec) for qp in range(1, top + 1)]
         assert qps == sorted(qps)
         assert min(qps) >= 1
         assert max(qps) <= top
-    assert default_disparity_qp(30, 2, codec) < 30 < default_disparity_qp(30, 1, codec)
+    assert default_disparity_qp(30, 2, (0.0, 64.0), codec) < default_disparity_qp(30, 1, (0.0, 64.0), codec)
+
+
+def test_model_keeps_the_error_in_pixels_where_the_range_is_wider() -> None:
+    """Six QPs are a quantiser's step twice as wide."""
+    assert default_disparity_qp(30, 2, (0.0, 80.0)) == default_disparity_qp(30, 2, (-10.0, 30.0)) - 6
 
 
 def mean_error_px(picture: NDArray[np.uint8], small: FloatMap, truth: FloatMap) -> float:

@@ -165,8 +165,12 @@ def _encode(material: Material) -> Times:
         TrackKind.DISPARITY: coded_size(array.width, array.height, scale),
     }
     tracks: list[tuple[VideoSettings, list[Planes]]] = []
+    rates = {
+        TrackKind.TEXTURE: config.rate_of_pictures(array),
+        TrackKind.DISPARITY: config.rate_of_maps(array, material.range_px),
+    }
     for kind, (width, height) in sizes.items():
-        rate = config.rate_of(kind, array)
+        rate = rates[kind]
         settings = VideoSettings(kind, width, height, array.fps, default_gop(array.fps), rate, config.preset)
         for camera in array.real:
             if kind is TrackKind.TEXTURE:

@@ -100,7 +100,7 @@ def add_disparity(parser: argparse.ArgumentParser) -> None:
         "--disparity-median",
         type=int,
         metavar="N",
-        help="smooth maps over N x N before coding, N odd; 0: don't (default: 7, at half size 3)",
+        help="smooth maps over N x N before coding, N odd; 0: don't (default: 5, at half size 3)",
     )
 
 
