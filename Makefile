@@ -2,6 +2,7 @@
 # make test       lint, types, import rules, tests (under ten minutes on two cores)
 # make test-slow  the tests that take more than a minute each
 # make benchmark  quality and speed on DATA=folder (an array folder or a folder of them)
+# make fuzz       damaged input to everything that reads files, SECONDS=120 for each of five readers
 # make lint       ruff, mypy, import-linter
 #
 # Each sets .venv up first where it is missing or older than pyproject.toml.
@@ -15,12 +16,13 @@ BIN := $(VENV)/bin
 INPUT ?=
 OUT ?= demo
 DATA ?= ../shared/data
+SECONDS ?= 120
 
 NEEDS_PYTHON = $(if $(PYTHON),,$(error mvcodec needs Python 3.11 or newer; none found on PATH))
 NEEDS_VENV = $(if $(shell $(PYTHON) -c 'import sys, venv, ensurepip; print(sys.version_info >= (3, 11) or "")' 2>/dev/null),,\
 	$(error mvcodec needs Python 3.11 or newer with the venv module (Debian, Ubuntu: apt install python3-venv); $(PYTHON) is not))
 
-.PHONY: demo test test-slow benchmark lint
+.PHONY: demo test test-slow benchmark fuzz lint
 
 demo: $(STAMP)
 	$(BIN)/python tools/demo.py $(if $(INPUT),--input "$(INPUT)") --out "$(OUT)"
@@ -33,6 +35,10 @@ test-slow: $(STAMP)
 
 benchmark: $(STAMP)
 	$(BIN)/python tools/benchmark.py --data "$(DATA)"
+
+fuzz: $(STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
+	for target in header nal reader chunk check; do $(BIN)/python tools/fuzz.py $$target --seconds $(SECONDS) || exit 1; done
 
 lint: $(STAMP)
 	$(BIN)/ruff check

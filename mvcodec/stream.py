@@ -41,6 +41,18 @@ class Track:
         return f"/camera/{view_name(self.camera)}/{self.kind.value}"
 
 
+_TYPES: dict[str, tuple[type, ...]] = {
+    "rows": (int,),
+    "cols": (int,),
+    "width": (int,),
+    "height": (int,),
+    "fps": (int, float),
+    "rho": (int, float),
+    "name": (str,),
+}
+"""What JSON types the header's array fields may have."""
+
+
 HEADER_TRACK = Track(TrackKind.HEADER)
 
 
@@ -128,12 +140,15 @@ class StreamHeader:
             raise StreamError(source, f"format version {version}", f"version {FORMAT_VERSION}")
         try:
             return cls._from_document(document)
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
+        except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
             raise StreamError(source, f"a damaged header ({error})", "the fields of FORMAT.md") from None
 
     @classmethod
     def _from_document(cls, document: Mapping[str, Any]) -> StreamHeader:
         array = dict(document["array"])
+        for name, kind in _TYPES.items():
+            if type(array[name]) not in kind:
+                raise TypeError(f"array.{name} of type {type(array[name]).__name__}")
         hint = array.pop("disparity_per_step_px")
         return cls(
             array=CameraArray(

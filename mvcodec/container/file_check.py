@@ -239,9 +239,12 @@ class FileCheck:
             self._declare(opcode, content)
         elif opcode == Opcode.MESSAGE:
             self._tell("record", "a message outside of chunks")
-            message, _ = self._message(content)
-            if message is not None:
-                yield message
+            try:
+                message, _ = self._message(content)
+            except RecordError as damage:
+                self._tell("record", str(damage))
+            else:
+                yield from () if message is None else (message,)
         elif opcode == Opcode.MESSAGE_INDEX:
             self._check_message_index(content, place)
         elif opcode == Opcode.METADATA:
