@@ -149,7 +149,7 @@ def test_each_push_returns_its_own_packets_at_once() -> None:
     header = StreamHeader.from_json(coded[5][0].data)
     assert header.array == ARRAY
     assert header.first_frame == 0
-    expected = {"qp": 20, "disparity_qp": 29, "gop": 5, "preset": "veryfast", "matcher": "RampMatcher"}
+    expected = {"qp": 20, "disparity_qp": 25, "gop": 5, "preset": "veryfast", "matcher": "RampMatcher"}
     assert expected.items() <= header.settings.items()
 
 

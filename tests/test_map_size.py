@@ -155,7 +155,8 @@ def test_model_quantises_small_maps_finer_and_stays_within_the_scale(codec: str,
 
 def test_model_keeps_the_error_in_pixels_where_the_range_is_wider() -> None:
     """Six QPs are a quantiser's step twice as wide."""
-    assert default_disparity_qp(30, 2, (0.0, 80.0)) == default_disparity_qp(30, 2, (-10.0, 30.0)) - 6
+    assert default_disparity_qp(30, 2, (0.0, 160.0)) == default_disparity_qp(30, 2, (-10.0, 70.0)) - 6
+    assert default_disparity_qp(30, 2, (0.0, 8.0)) == default_disparity_qp(30, 2, (0.0, 64.0)) == 30
 
 
 def mean_error_px(picture: NDArray[np.uint8], small: FloatMap, truth: FloatMap) -> float:
