@@ -10,12 +10,13 @@ from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
 from mvcodec.stereo.joint import Joint
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stereo.pairwise import Pairwise
-from mvcodec.stereo.sgbm import Sgbm
+from mvcodec.stereo.sgbm import Sgbm, SgbmSettings
 
 MATCHERS: dict[str, Callable[[], Matcher]] = {
     "joint": Joint,
     "sgbm": lambda: Pairwise(Sgbm()),
-    "sgbm-h": lambda: Pairwise(Sgbm(), vertical=False),
+    # Plain maps to judge renderers by: one partner, and the customary 3 x 3 block.
+    "sgbm-h": lambda: Pairwise(Sgbm(SgbmSettings(block_size=3)), vertical=False),
     "sad": lambda: Pairwise(FixedWindow()),
     "ssd": lambda: Pairwise(FixedWindow(FixedWindowSettings("ssd", window=9, subpixel=True))),
     "ncc": lambda: Pairwise(FixedWindow(FixedWindowSettings("ncc", window=9, subpixel=True))),
