@@ -10,6 +10,7 @@ from collections.abc import Callable
 import pytest
 
 from mvcodec.cli.arguments import (
+    disparity_qp,
     disparity_range,
     frame_slice,
     join_negative_values,
@@ -43,6 +44,11 @@ def test_disparity_ranges_may_be_negative(text: str, expected: object) -> None:
     assert disparity_range(text) == expected
 
 
+def test_disparity_qps_may_be_left_to_the_encoder() -> None:
+    assert disparity_qp("auto") is None
+    assert disparity_qp("31") == 31
+
+
 def test_sizes_and_views_parse() -> None:
     assert pair_of_sizes("640x360") == (640, 360)
     assert pair_of_sizes("5X3") == (5, 3)
@@ -53,6 +59,8 @@ def test_sizes_and_views_parse() -> None:
 @pytest.mark.parametrize(
     ("parser", "text"),
     [
+        (disparity_qp, "low"),
+        (disparity_qp, "2.5"),
         (frame_slice, "5"),
         (frame_slice, "0:8:2"),
         (frame_slice, "a:b"),

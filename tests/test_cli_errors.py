@@ -117,6 +117,8 @@ def test_unknown_names_are_answered_with_the_choices(array: Path, coded: Path, t
         ("--qp", "0"),
         ("--qp", "52"),
         ("--disparity-qp", "0"),
+        ("--disparity-scale", "3"),
+        ("--disparity-median", "4"),
         ("--gop", "11"),
         ("--gop", "0"),
         ("--crf", "99"),

@@ -152,7 +152,8 @@ def test_an_existing_folder_is_written_into(coded: Path, tmp_path: Path) -> None
 
 
 def test_every_setting_at_once(array: Path, tmp_path: Path) -> None:
-    options = "--real all --crf 24 --disparity-qp 30 --gop 2 --matcher sgbm --preset veryfast --frames :3"
+    maps = "--disparity-qp 30 --disparity-scale 2 --disparity-median 0"
+    options = f"--real all --crf 24 {maps} --gop 2 --matcher sgbm --preset veryfast --frames :3"
     out = succeeds(
         "encode", array, tmp_path / "x.mcap", *options.split(), "--disparity-range", "-2,6", "--json"
     )
@@ -160,6 +161,9 @@ def test_every_setting_at_once(array: Path, tmp_path: Path) -> None:
     assert len(info["real"]) == 9
     assert info["frames"] == 3
     assert info["disparity_range_px"] == [-2.0, 6.0]
+    assert info["disparity_scale"] == 2
+    assert "maps of half size" in succeeds("info", tmp_path / "x.mcap")
+    assert "clean" in succeeds("validate", tmp_path / "x.mcap")
     rated = succeeds(
         "encode", array, tmp_path / "y.mcap", "--bitrate", "300", "--disparity-range", "auto", "--json"
     )

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from mvcodec.array import CameraArray
 from mvcodec.capture import open_input, resolve_frames
-from mvcodec.cli.arguments import add_frames, add_output_options, disparity_range, pair_of_sizes, positive_int
+from mvcodec.cli.arguments import (
+    add_disparity,
+    add_frames,
+    add_output_options,
+    disparity_range,
+    pair_of_sizes,
+    positive_int,
+)
 from mvcodec.cli.decode import DEFAULT_SYNTHESIZER
 from mvcodec.cli.encode import OPTIONS, find_range
 from mvcodec.cli.progress import progress
@@ -75,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME,..",
         help=f"codecs of the anchors, some of {', '.join(CODECS)} (default: all)",
     )
-    parser.add_argument("--disparity-qp", type=int, metavar="N", help="QP of the disparity maps")
+    add_disparity(parser)
     parser.add_argument("--disparity-range", type=disparity_range, metavar="LO,HI|auto", help="as for encode")
     parser.add_argument(
         "--gop", type=int, metavar="N", help="frames from keyframe to keyframe, in all curves"
@@ -173,6 +180,8 @@ def _study(array: CameraArray, arguments: argparse.Namespace, range_px: tuple[fl
     try:
         config = EncoderConfig(
             disparity_qp=arguments.disparity_qp,
+            disparity_scale=arguments.disparity_scale,
+            disparity_median=arguments.disparity_median,
             disparity_range_px=range_px,
             gop=arguments.gop,
             matcher=arguments.matcher,

@@ -28,7 +28,8 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"{arguments.input}: {summary(info)}")
     print(f"  grid         {array.rows} x {array.cols}, {array.width} x {array.height} px, {array.fps:g} fps")
     print(f"  real         {len(array.real)} cameras: rows {rows}, cols {cols}")
-    print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras")
+    size = "half" if info.header.disparity_scale == 2 else "full"
+    print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras, maps of {size} size")
     print(f"  calibration  {'given' if array.calibration.given else 'nominal (the input stated none)'}")
     for name, bits in asdict(info.bits).items():
         print(f"  {name:11}  {bits / 1000:.1f} kbit")
@@ -45,6 +46,7 @@ def document(info: StreamInfo) -> dict[str, Any]:
         "size": [array.width, array.height],
         "bits": asdict(info.bits),
         "disparity_range_px": list(info.header.disparity_range_px),
+        "disparity_scale": info.header.disparity_scale,
         "calibration": "given" if array.calibration.given else "nominal",
     }
 
