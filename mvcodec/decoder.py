@@ -69,7 +69,7 @@ class Decoder:
         """A decoder of a file, pipe or standard input, to iterate over.
 
         Args:
-            source: path, or a binary file that may be a pipe and stays open.
+            source: path, URL of a file on a web server, or a binary file that may be a pipe and stays open.
             frames: Python slice over the frame sets that the file holds (from 0), step 1.
             on_error, limits: as the constructor's.
 
@@ -100,6 +100,16 @@ class Decoder:
         if self._header is None:
             raise StreamError(self._name, "no header yet", "a header before anything else")
         return self._header
+
+    @property
+    def bytes_read(self) -> int:
+        """Bytes taken from the source given to `open` so far."""
+        return 0 if self._reader is None else self._reader.bytes_read
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of the source given to `open`; of a pipe, what was read so far."""
+        return 0 if self._reader is None else self._reader.size
 
     def __iter__(self) -> Iterator[DecodedSet]:
         """Decode the source given to `open`. A pipe can be gone through once only.

@@ -2,7 +2,7 @@
 
     python tools/fuzz.py TARGET [--seconds 600] [--corpus FOLDER] [--keep]
 
-Stops at the first crash, hang (10 s for an input) or use of more than 1 GiB; leaves the input in ./fuzz-finds.
+Stops at the first crash, hang (10 s) or use of more than 1 GiB, and leaves the input in ./fuzz-finds.
 With --keep, inputs that reach new code are added to the corpus.
 """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -45,7 +46,9 @@ Sink = Callable[[DecodedSet, list[RenderedView]], None]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``decode``."""
-    parser.add_argument("input", metavar="IN.mcap", help="or - for standard input")
+    parser.add_argument(
+        "input", metavar="IN.mcap", help="or its URL on a web server, or - for standard input"
+    )
     parser.add_argument(
         "output",
         type=Path,
@@ -86,13 +89,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_frames(parser, "frames of the file to decode")
     add_on_error(parser, "stop")
     add_limits(parser)
-    add_output_options(parser)
+    add_output_options(parser, "print what was decoded, and how much of the input was read, as JSON")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Decode, render every view of each frame set on both cores, write."""
     synthesizer = make_synthesizer(arguments.synthesizer)
     form = arguments.format or ("png" if arguments.view else "array")
+    if arguments.json and str(arguments.output) == STANDARD:
+        raise SettingError("--json", "with OUT -", "another OUT: both would be standard output")
     if form == "array" and arguments.view:
         raise SettingError("--view", "single views", "--grid RxC for --format array, which holds a grid")
     _check_output(form, arguments)
@@ -107,6 +112,7 @@ def run(arguments: argparse.Namespace) -> None:
     ):
         plan = _plan(decoder.header, arguments)
         sink: Sink | None = None
+        frames = 0
         try:
             for decoded in decoder:
                 views = _render(synthesizer, decoded, plan.viewpoints, pool)
@@ -115,16 +121,19 @@ def run(arguments: argparse.Namespace) -> None:
                     sink = _open_sink(form, arguments, plan, outputs)
                 sink(decoded, views)
                 bar.update()
+                frames += 1
                 if form == MOSAIC and arguments.output.suffix.lower() == ".png":
                     break  # one picture holds one frame set
         except StreamError as error:
             damage = error  # the outputs are completed first, so that what was decoded stays
+    if arguments.json:
+        print(json.dumps({"frames": frames, "bytes_read": decoder.bytes_read, "bytes": decoder.bytes}))
     if damage is not None:
         raise damage
 
 
 @contextmanager
-def _source(arguments: argparse.Namespace) -> Iterator[Path | BinaryIO]:
+def _source(arguments: argparse.Namespace) -> Iterator[str | BinaryIO]:
     """The input. With --follow, Ctrl-C ends it, as its end does."""
     if arguments.input == STANDARD:
         yield sys.stdin.buffer
@@ -132,7 +141,7 @@ def _source(arguments: argparse.Namespace) -> Iterator[Path | BinaryIO]:
         with deferred_interrupt() as interrupted, FollowedFile(Path(arguments.input), interrupted) as file:
             yield cast("BinaryIO", file)
     else:
-        yield Path(arguments.input)
+        yield arguments.input
 
 
 def _check_output(form: str, arguments: argparse.Namespace) -> None:
@@ -199,9 +208,9 @@ def _plan(header: StreamHeader, arguments: argparse.Namespace) -> OutputPlan:
     return OutputPlan(array, array.viewpoints(*grid), grid)
 
 
-def _frame_total(source: Path | BinaryIO, frames: slice | None) -> int | None:
+def _frame_total(source: str | BinaryIO, frames: slice | None) -> int | None:
     """How many frames the progress bar counts to; unknown where the input cannot be read twice."""
-    if not isinstance(source, Path) or not sys.stderr.isatty():
+    if not isinstance(source, str) or not sys.stderr.isatty():
         return None
     with McapReader.open(source) as reader:
         count = reader.frame_count

@@ -107,9 +107,13 @@ class ChunkReader:
         schema = None if channel is None else self._schemas.get(channel.schema_id)
         return "" if schema is None else schema.name, "" if channel is None else channel.message_encoding
 
-    def chunks(self, first: int = 0) -> Iterator[list[TopicMessage]]:
-        """The chunks in file order; from chunk `first`, if the file is indexed."""
-        return self._streamed() if self._index is None else self._indexed(self._index.chunks[first:])
+    def chunks(self, first: int = 0, end_ns: int | None = None) -> Iterator[list[TopicMessage]]:
+        """The chunks in file order; if the file is indexed, from chunk `first` and before a time."""
+        if self._index is None:
+            return self._streamed()
+        return self._indexed(
+            [c for c in self._index.chunks[first:] if end_ns is None or c.message_start_time < end_ns]
+        )
 
     def chunk_at(self, time_ns: int) -> int:
         """The first chunk of an indexed file that does not end before a time."""

@@ -15,6 +15,7 @@ from mcap.records import Message
 from mvcodec.container import schemas
 from mvcodec.container.chunks import EXPECTED, ChunkReader, OnDamage, TopicMessage
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.container.remote import is_url, open_url
 from mvcodec.errors import InputError, MvCodecWarning, SettingError, StreamError
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track
 
@@ -48,6 +49,7 @@ class McapReader:
         self._owned: BinaryIO | None = None
         self._on_damage = on_damage
         self._gap = False
+        self._known_times: dict[str, list[int]] = {}
         self._chunks = ChunkReader(file, name, limits, None if on_damage is None else self._skip)
         if self._chunks.indexed and HEADER_TRACK.topic not in self._chunks.topics:
             raise self._headless()
@@ -63,7 +65,7 @@ class McapReader:
         limits: Limits = DEFAULT_LIMITS,
         on_damage: OnDamage | None = None,
     ) -> McapReader:
-        """Open a path, or take a binary file or pipe.
+        """Open a path or the URL of a file on a web server, or take a binary file or pipe.
 
         Raises:
             InputError: the system refuses to open it.
@@ -72,7 +74,7 @@ class McapReader:
         if not isinstance(source, str | Path):
             return cls(source, str(getattr(source, "name", "input")), limits, on_damage)
         try:
-            file = Path(source).open("rb")  # noqa: SIM115 - `close` closes it
+            file = open_url(str(source)) if is_url(str(source)) else Path(source).open("rb")  # noqa: SIM115
         except OSError as error:
             raise InputError(source, error.strerror, "a file that can be read") from None
         try:
@@ -150,7 +152,7 @@ class McapReader:
         if self._chunks.indexed:
             self._gap = False
             first_ns, number = self._keyframe_before(start)
-            chunks = self._chunks.chunks(self._chunks.chunk_at(first_ns))
+            chunks = self._chunks.chunks(self._chunks.chunk_at(first_ns), self._time_of(stop))
         index = self.header.first_frame + number
         last: Packet | None = None
         keyframe = False
@@ -232,6 +234,13 @@ class McapReader:
             data = schemas.video_data(data, source, self.header.codec)
         return Packet(track, message.sequence, message.log_time, keyframe, data)
 
+    def _time_of(self, number: int | None) -> int | None:
+        """Time of a frame set, ns; None for one that is not there."""
+        if number is None:
+            return None
+        times = self._times(self.header.tracks[0])
+        return times[number] if number < len(times) else None
+
     def _keyframe_before(self, start: int) -> tuple[int, int]:
         """Time of the keyframe at or before a frame set, ns, and the number of the set before it."""
         if start == 0:
@@ -241,4 +250,6 @@ class McapReader:
         return key_ns, bisect_right(times, key_ns) - 2
 
     def _times(self, track: Track) -> list[int]:
-        return self._chunks.times(track.topic)
+        if track.topic not in self._known_times:
+            self._known_times[track.topic] = self._chunks.times(track.topic)
+        return self._known_times[track.topic]

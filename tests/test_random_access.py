@@ -1,0 +1,122 @@
+"""A range of frames costs the chunks that hold it, from a disk and from a web server."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+from coding import encoded_file, make_array
+from command_line import fails, succeeds
+from damage import chunk_ends
+
+from mvcodec.container import McapReader
+from mvcodec.decoder import Decoder
+from mvcodec.errors import InputError
+
+COUNT, GOP = 120, 10
+
+
+@pytest.fixture(scope="module")
+def content() -> bytes:
+    return encoded_file(make_array(240, 160, rows=1, cols=2, fps=10.0), COUNT, gop=GOP, qp=12)
+
+
+def _gop_bytes(content: bytes, number: int) -> int:
+    """Bytes of the chunks of a GOP (two for each: ten frames at 10 frames/s)."""
+    ends = [0, *chunk_ends(content)]
+    return ends[2 * number + 2] - ends[2 * number]
+
+
+def _summary_bytes(content: bytes) -> int:
+    """Indexes: message indexes behind each chunk, and everything behind the last one."""
+    starts = sum(9 + 2 + 4 + 16 * GOP for _ in range(COUNT))
+    return len(content) - chunk_ends(content)[-1] + starts
+
+
+@pytest.mark.parametrize("frame", [0, 37, 59, 119])
+def test_one_frame_reads_two_gops_at_most(content: bytes, frame: int) -> None:
+    with Decoder.open(io.BytesIO(content), slice(frame, frame + 1)) as decoder:
+        (found,) = decoder
+        assert found.index == frame
+        gops = _gop_bytes(content, 0) + _gop_bytes(content, frame // GOP)
+        assert decoder.bytes_read <= gops + _summary_bytes(content)
+        assert decoder.bytes_read < decoder.bytes / 3
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Serves one file, by ranges where they are asked for; counts what leaves."""
+
+    content = b""
+    ranges = True
+    served = 0
+
+    def do_HEAD(self) -> None:
+        self._answer(body=False)
+
+    def do_GET(self) -> None:
+        self._answer(body=True)
+
+    def _answer(self, body: bool) -> None:
+        if not self.path.endswith("x.mcap"):
+            self.send_error(404)
+            return
+        wanted = re.match(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
+        part = self.content
+        if wanted and self.ranges:
+            first, last = int(wanted[1]), min(int(wanted[2]), len(self.content) - 1)
+            part = self.content[first : last + 1]
+            self.send_response(206)
+            self.send_header("Content-Range", f"bytes {first}-{last}/{len(self.content)}")
+        else:
+            self.send_response(200)
+        if self.ranges:
+            self.send_header("Accept-Ranges", "bytes")
+        self.send_header("Content-Length", str(len(part)))
+        self.end_headers()
+        if body:
+            type(self).served += len(part)
+            self.wfile.write(part)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing."""
+
+
+@pytest.fixture
+def url(content: bytes) -> Iterator[str]:
+    _Handler.content, _Handler.ranges, _Handler.served = content, True, 0
+    server = ThreadingHTTPServer(("127.0.0.1", 0), _Handler)
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}/x.mcap"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_a_file_on_a_web_server_decodes_by_ranges(content: bytes, url: str) -> None:
+    with Decoder.open(url, slice(57, 58)) as decoder:
+        (found,) = decoder
+    assert found.index == 57
+    assert _Handler.served < len(content) / 2, "the rest stays where it is"
+    with McapReader.open(url) as reader:
+        assert reader.frame_count == COUNT
+
+
+def test_the_command_decodes_a_url_and_reports_what_it_read(content: bytes, url: str, tmp_path: Path) -> None:
+    arguments = ("decode", url, tmp_path / "out", "--frames", "57:58", "--synthesizer", "linear", "--json")
+    report = json.loads(succeeds(*arguments))
+    assert (report["frames"], report["bytes"]) == (1, len(content))
+    assert 0 < report["bytes_read"] < len(content) / 3
+    assert "no such file" in fails(1, "decode", url.replace("x.mcap", "y.mcap"), tmp_path / "out")
+
+
+def test_a_server_without_ranges_is_named(url: str) -> None:
+    _Handler.ranges = False
+    with pytest.raises(InputError, match="does not serve ranges"):
+        Decoder.open(url)
