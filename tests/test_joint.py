@@ -61,7 +61,7 @@ def test_hidden_background_does_not_join_an_object_of_its_colour_that_others_wou
     hidden = np.s_[18:42, 38:50]  # dark as the square, so that colour puts it there
     far[:, MARGIN + 38 : MARGIN + 50] = noise(3, len(far), 12, 0, 20)
     bad = {}
-    for through_cost in (0.0, JointSettings().through_cost):
+    for through_cost in (0, JointSettings().through_cost):
         matcher = Joint(JointSettings(through_cost=through_cost))
         found = matcher.match(scene.array, pictures_of(scene), (0.0, 20.0))[0, 0]
         assert found.valid[hidden].mean() < 0.1
@@ -171,6 +171,15 @@ def test_disparity_is_that_of_a_cell_whatever_its_steps(step: int, row_step: int
         assert np.mean(np.abs(maps[camera].values_px - truth_of(scene, camera)) > 1) < 0.01
 
 
+@pytest.mark.parametrize("high", range(4, 13))
+def test_both_ends_of_the_range_are_found(high: int) -> None:
+    array = linear_or_grid(1, 2, 60, 40)
+    for disparity in (-1.0, float(high)):
+        found = Joint().match(array, Planes(array, disparity, disparity).pictures(), (-1.0, high))[0, 0]
+        assert found.valid[:, high:].mean() > 0.95
+        assert np.abs(found.values_px - disparity).mean() < 0.1
+
+
 @pytest.mark.parametrize("disparity", [3.3, -2.6])
 def test_sub_pixel_steps_place_a_plane_between_levels(disparity: float) -> None:
     array = linear_or_grid(2, 2, 100, 60)
@@ -220,7 +229,7 @@ def test_bad_settings_are_named(make: Callable[[], JointSettings], text: str) ->
 
 def test_settings_at_their_limits_still_make_maps() -> None:
     """Costs stay within their 8 bits where every one of them is the highest."""
-    dearest = JointSettings(120.0, 1e6, 130.0, 100, 254, through_cost=254.0, hold_limit=254.0, median_size=0)
+    dearest = JointSettings(120, 1000, 130, 100, 254, through_cost=254, hold_limit=254, median_size=0)
     array = linear_or_grid(2, 2, 90, 70)
     scene = Planes(array, 2, 8)
     maps = Joint(dearest).match(array, scene.pictures(), (0.0, 12.0))
