@@ -1,0 +1,92 @@
+"""Write README's tables of figures from measurements: between its two marks, nothing by hand.
+
+python tools/benchmark.py --data ../shared/data --what quality --json > quality.json
+mvcodec evaluate ../shared/data/SET --output REPORT ...
+python tools/readme_figures.py README.md --quality quality.json --reports REPORT/report.json ...
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from mvcodec.errors import InputError, MvCodecError
+from mvcodec.output.atomic import write_bytes
+
+BEGIN, END = "<!-- figures -->", "<!-- end of figures -->"
+
+
+def main() -> int:
+    """Parse, read, write."""
+    parser = argparse.ArgumentParser(description="README's tables of figures, from measurements.")
+    parser.add_argument("readme", type=Path, metavar="README.md")
+    parser.add_argument(
+        "--quality", type=Path, required=True, metavar="FILE.json", help="of tools/benchmark.py"
+    )
+    parser.add_argument(
+        "--reports", type=Path, nargs="*", default=[], metavar="REPORT.json", help="of evaluate"
+    )
+    arguments = parser.parse_args()
+    try:
+        text = arguments.readme.read_text(encoding="utf-8")
+        tables = [
+            quality_table(_read(arguments.quality)),
+            rate_table([_read(path) for path in arguments.reports]),
+        ]
+        write_bytes(arguments.readme, replaced(text, tables, arguments.readme).encode())
+    except (MvCodecError, OSError) as error:
+        print(f"readme_figures: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def replaced(text: str, tables: Sequence[str], source: Path) -> str:
+    """The text with the tables between the marks.
+
+    Raises:
+        InputError: the marks are not there, once each and in order.
+    """
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise InputError(source, "no place for the figures", f"a line {BEGIN} and a line {END}")
+    body = "\n\n".join(table for table in tables if table)
+    return f"{before}{BEGIN}\n\n{body}\n\n{END}{after}"
+
+
+def quality_table(benchmark: Mapping[str, Any]) -> str:
+    """Synthesis alone: the corner cameras uncoded, by set."""
+    lines = ["| set | Y-PSNR, dB | worst view, dB | SSIM |", "|---|---|---|---|"]
+    for name, row in sorted(benchmark["sets"].items()):
+        lines.append(f"| {name} | {row['psnr_y']:.2f} | {row['worst_psnr_y']:.2f} | {row['ssim']:.4f} |")
+    return "\n".join(lines)
+
+
+def rate_table(reports: Sequence[Mapping[str, Any]]) -> str:
+    """BD-rate against each anchor, by input."""
+    if not reports:
+        return ""
+    lines = ["| input | against | bits at equal Y-PSNR, all views | overlap, dB |", "|---|---|---|---|"]
+    for report in reports:
+        for anchor, figures in report["bd_rate"].items():
+            if figures["all"] is None:
+                continue
+            low, high = figures["overlap_db"]
+            name = Path(report["input"]).name
+            lines.append(f"| {name} | {anchor} | {figures['all']:+.1f} % | {low:.1f} - {high:.1f} |")
+    return "\n".join(lines)
+
+
+def _read(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(path, f"no JSON ({error})", "a file that benchmark or evaluate wrote") from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())
