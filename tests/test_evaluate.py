@@ -65,7 +65,10 @@ def test_report_has_the_documented_form(array: Path, measured: Path) -> None:
                 assert 0 < figures["worst"] <= figures["all"] < top
             assert point["encode_seconds"] > 0
             assert point["decode_seconds"] > 0
-    assert [point["qp"] for point in document["curves"][0]["points"]] == [24, 30, 36, 42]
+    ours = document["curves"][0]["points"]
+    assert [point["qp"] for point in ours] == [24, 30, 36, 42]
+    assert [point["settings"]["qp"] for point in ours] == [24, 30, 36, 42]
+    assert all(1 <= point["settings"]["disparity_qp"] <= 51 for point in ours)
     for delta in document["bd_rate"].values():
         low, high = delta["overlap_db"]
         assert low < high
@@ -215,6 +218,7 @@ def test_pictures_that_occur_twice_are_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        (("--disparity-scale", "3"), "--disparity-scale: found 3"),
         (("--qp", "60"), "--qp: found 60, expected an integer, 1..51"),
         (("--qp", "a"), "expected whole numbers such as 22,27,32,37"),
         (("--anchors", "best"), "--anchors: found best, expected some of simulcast, pvs"),

@@ -51,7 +51,8 @@ def measure_chain(
         part.replace(file)
     finally:
         part.unlink(missing_ok=True)
-    bits = read_info(file).bits
+    info = read_info(file)
+    bits = info.bits
     return CurvePoint(
         qp=config.qp,
         bits=bits.total,
@@ -61,6 +62,7 @@ def measure_chain(
         encode_seconds=encoding.seconds,
         decode_seconds=decoding.seconds,
         file=file.name,
+        settings=info.header.settings,
     )
 
 

@@ -147,7 +147,7 @@ def _figure(shown: Shown) -> str:
 
 
 def _points(document: Mapping[str, Any]) -> str:
-    head = ["Curve", "QP", "kbit/s", "kbit a<br>frame set", "maps"]
+    head = ["Curve", "QP", "kbit/s", "kbit a<br>frame set", "maps", "map<br>QP"]
     head += [f"Y-PSNR dB<br>{kind}" for kind in ("all", "real", "virtual", "worst")]
     head += [f"SSIM<br>{kind}" for kind in ("all", "virtual")]
     head += ["encode s", "decode s"]
@@ -158,6 +158,7 @@ def _points(document: Mapping[str, Any]) -> str:
             maps = point["bits_split"]["disparity"] / point["bits"]
             cells = [curve["label"] if number == 0 else "", str(point["qp"]), f"{point['kbps']:.1f}"]
             cells += [f"{point['bits'] / document['frames'] / 1000:.1f}", f"{maps:.0%}" if own else ""]
+            cells += [str(point.get("settings", {}).get("disparity_qp", ""))]
             cells += [_number(point["psnr_y"][kind], ".2f") for kind in ("all", "real", "virtual", "worst")]
             cells += [_number(point["ssim"][kind], ".4f") for kind in ("all", "virtual")]
             cells += [f"{point['encode_seconds']:.1f}", f"{point['decode_seconds']:.1f}"]

@@ -39,7 +39,8 @@ class CurvePoint:
         kbps: the same, kbit/s.
         quality: of the decoded (and synthesised) views.
         encode_seconds, decode_seconds: wall-clock seconds of the stages, without measuring.
-        file: name of the kept stream in the folder, where it is kept.
+        file: name of the kept stream in the folder; None for an anchor.
+        settings: the encoder's record in that stream's header; None for an anchor.
     """
 
     qp: int
@@ -50,10 +51,11 @@ class CurvePoint:
     encode_seconds: float
     decode_seconds: float
     file: str | None = None
+    settings: Mapping[str, Any] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """As ``report.json`` has it: without the single views."""
-        return {
+        document = {
             "qp": self.qp,
             "bits": self.bits,
             "kbps": self.kbps,
@@ -63,6 +65,7 @@ class CurvePoint:
             "encode_seconds": self.encode_seconds,
             "decode_seconds": self.decode_seconds,
         }
+        return document if self.settings is None else {**document, "settings": dict(self.settings)}
 
 
 class PointStore:
