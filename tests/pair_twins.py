@@ -19,7 +19,7 @@ def forward_sources(shift_px: NDArray[np.int32], nearness: FloatMap, usable: Mas
     return source
 
 
-def blend_pair(  # noqa: PLR0917 - called as the compiled one is
+def blend_pair(
     left: Picture,
     right: Picture,
     left_disparity: FloatMap,

@@ -246,7 +246,8 @@ def test_a_flipped_bit_in_a_chunk_is_found_with_its_time(file: bytes) -> None:
     for source in (io.BytesIO(bytes(broken)), Pipe(bytes(broken))):
         reader = McapReader(source)  # type: ignore[arg-type]
         seen: set[int] = set()
-        with pytest.raises(StreamError, match=r"/calibration and 13 more topics at 3\.800\.\.4\.100 s: found damage"):
+        where = r"/calibration and 13 more topics at 3\.800\.\.4\.100 s: found damage"
+        with pytest.raises(StreamError, match=where):
             seen.update(number for number, _ in reader.packets())
         assert seen <= set(range(8))
 
