@@ -24,6 +24,7 @@ from mvcodec.container import McapReader, McapWriter
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stream import TrackKind
+from mvcodec.video.map_size import small_size
 from mvcodec.video.table import find_codec
 
 RANGE_PX = (-3.0, 9.5)
@@ -74,6 +75,7 @@ CASES: dict[str, tuple[CameraArray, int, int, dict[str, Any]]] = {
     "odd_size": (_nominal(1, 4, 33, 17, 25.0), 3, 0, {"qp": 24}),
     "one_column": (_nominal(4, 1, 32, 32, 2.0), 4, 7, {"qp": 30, "disparity_qp": 40}),
     "calibrated": (_calibrated(), 2, 0, {"qp": None, "crf": 30.0}),
+    "half_size_maps": (_nominal(2, 3, 35, 50, 10.0), 3, 0, {"qp": 30, "disparity_scale": 2}),
 }
 
 
@@ -98,26 +100,31 @@ def write_case(name: str) -> bytes:
 
 
 def describe(content: bytes) -> dict[str, Any]:
-    """What a conformant decoder finds: header, and each plane's CRC-32 (cropped rows, top to bottom).
+    """What a conformant decoder finds: stored header, and CRC-32 of planes (cropped rows, top to bottom).
 
     Pictures are described by the planes that the video decoder puts out, which the codec's standard
     fixes bit by bit; maps by their code values.
     """
     with McapReader(io.BytesIO(content)) as reader:
         codec, array = find_codec(reader.header.codec), reader.header.array
+        map_width, map_height = small_size(array.width, array.height, reader.header.disparity_scale)
+        header: dict[str, Any] = {}
         decoders = {track: codec.decoder() for track in reader.header.tracks}
         frames: list[dict[str, Any]] = []
         for number, packet in reader.packets():
             if number == len(frames):
                 frames.append({"index": packet.index, "time_ns": packet.time_ns, "crc32": {}})
             if packet.track.kind is TrackKind.HEADER:
+                header = json.loads(packet.data)
                 continue
             (planes,) = decoders[packet.track].push(packet.data, packet.track.topic)
-            luma = planes.y[: array.height, : array.width]
-            half = (slice((array.height + 1) // 2), slice((array.width + 1) // 2))
-            chroma = [] if packet.track.kind is TrackKind.DISPARITY else [planes.u[half], planes.v[half]]
-            frames[number]["crc32"][packet.track.topic] = [zlib.crc32(p.tobytes()) for p in (luma, *chroma)]
-        return {"header": json.loads(reader.header.to_json()), "frame_sets": frames}
+            if packet.track.kind is TrackKind.DISPARITY:
+                found = [planes.y[:map_height, :map_width]]
+            else:
+                half = (slice((array.height + 1) // 2), slice((array.width + 1) // 2))
+                found = [planes.y[: array.height, : array.width], planes.u[half], planes.v[half]]
+            frames[number]["crc32"][packet.track.topic] = [zlib.crc32(p.tobytes()) for p in found]
+        return {"header": header, "frame_sets": frames}
 
 
 def main() -> int:
