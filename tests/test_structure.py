@@ -14,7 +14,7 @@ def listed_files() -> set[str]:
 
 
 def actual_files() -> set[str]:
-    folders = ("mvcodec", "tools", "examples")
+    folders = ("mvcodec", "benchmarks", "tools", "examples")
     paths = (path.relative_to(ROOT) for folder in folders for path in (ROOT / folder).rglob("*.py"))
     return {str(path) for path in paths if path.name != "__init__.py" or len(path.parts) == 2}
 
