@@ -13,6 +13,7 @@ import numpy as np
 
 import mvcodec
 from mvcodec.array import CameraArray, Position
+from mvcodec.depth import depth_mm
 from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stereo.matcher import Matcher
@@ -68,6 +69,7 @@ class EncoderConfig:
         disparity_range_px: (lo, hi) between neighbouring real cameras; by default estimated from
             the first frame set.
         codec: of the pictures and the maps, a name of `mvcodec.video.table.CODECS`.
+        depth: write each map as metric depth too, for other people's tools.
 
     Raises:
         SettingError: a value is outside its range, or not exactly one of qp, crf and
@@ -85,6 +87,7 @@ class EncoderConfig:
     codec: str = "h264"
     disparity_scale: int | None = None
     disparity_median: int | None = None
+    depth: bool = False
 
     def __post_init__(self) -> None:
         max_qp = find_codec(self.codec).max_qp
@@ -161,6 +164,7 @@ class Encoder:
         self._position = 0  # frame sets since the last keyframe, modulo the GOP
         self._key_ns = 0
         self._last: FrameSet | None = None
+        self._maps: Mapping[Position, DisparityMap] = {}
         self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(WORKERS, "encode")
 
     @property
@@ -198,6 +202,10 @@ class Encoder:
             self._key_ns = frames.time_ns
             head = Packet(HEADER_TRACK, frames.index, frames.time_ns, True, self._header.to_json())
             packets.insert(0, head)
+        if self.config.depth:
+            packets += [
+                _depth_packet(self.array, camera, frames, self._maps[camera]) for camera in self._maps
+            ]
         self._position = (position + 1) % self._gop
         self._last = frames
         return packets
@@ -217,6 +225,7 @@ class Encoder:
         assert self._header is not None
         maps = self._matcher.match(self.array, pictures, self._header.disparity_range_px)
         values = {camera: self._checked_map(maps, camera) for camera in self.array.real}
+        self._maps = values
         for camera, disparity in values.items():
             track = Track(TrackKind.DISPARITY, camera)
             jobs[track] = pool.submit(self._code_map, track, disparity, keyframe)
@@ -318,6 +327,12 @@ class Encoder:
 
     def _code(self, track: Track, planes: Planes, keyframe: bool) -> list[CodedPicture]:
         return self._encoders[track].push(planes, keyframe)
+
+
+def _depth_packet(array: CameraArray, camera: Position, frames: FrameSet, disparity: DisparityMap) -> Packet:
+    """Depth as little-endian 16-bit millimetres, row by row."""
+    data = depth_mm(array, disparity.values_px).astype("<u2").tobytes()
+    return Packet(Track(TrackKind.DEPTH, camera), frames.index, frames.time_ns, True, data)
 
 
 def _packet(track: Track, frames: FrameSet, coded: list[CodedPicture]) -> Packet:

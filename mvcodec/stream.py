@@ -24,6 +24,8 @@ class TrackKind(StrEnum):
     HEADER = "header"
     TEXTURE = "video"
     DISPARITY = "disparity"
+    DEPTH = "depth"
+    """Metric depth for other people's tools; decoders have no use for it."""
 
 
 @dataclass(frozen=True, slots=True)

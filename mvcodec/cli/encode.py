@@ -26,6 +26,7 @@ from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_chunk_ms, add_on_error
 from mvcodec.cli.standard_streams import STANDARD
 from mvcodec.container import read_info
+from mvcodec.depth import require_calibration
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
 from mvcodec.frames import FrameSet
@@ -110,6 +111,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--calibration", type=Path, metavar="FILE", help="JSON with the calibration as in array.json"
     )
+    parser.add_argument(
+        "--depth", choices=("raw16",), help="add metric depth, foxglove.RawImage of 16 bits, millimetres"
+    )
+    parser.add_argument("--nominal", action="store_true", help="accept nominal calibration for --depth")
     add_chunk_ms(parser)
     add_on_error(parser, "stop")
     add_stream_arguments(parser)
@@ -194,6 +199,8 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
 
 def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
     """The settings, checked against the array before the time-consuming part begins."""
+    if arguments.depth:
+        require_calibration(array, arguments.nominal)
     rates = {"qp": arguments.qp, "crf": arguments.crf, "bitrate_kbps": arguments.bitrate}
     if all(value is None for value in rates.values()):
         rates["qp"] = EncoderConfig().qp
@@ -207,6 +214,7 @@ def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
             matcher=arguments.matcher,
             preset=arguments.preset,
             codec=arguments.codec,
+            depth=arguments.depth is not None,
         )
         Encoder(array, config).flush()
     except SettingError as error:

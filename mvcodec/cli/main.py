@@ -8,7 +8,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
-from typing import NoReturn, TextIO
+from typing import Any, NoReturn, TextIO
 
 import mvcodec
 from mvcodec.cli.arguments import join_negative_values
@@ -21,6 +21,7 @@ COMMANDS: dict[str, str] = {
     "play": "watch a file in the browser, from any viewpoint",
     "render": "make pictures to take away: paths of the viewpoint, stereo, quilts, refocus",
     "info": "say what a file holds",
+    "export-points": "write what the cameras see as points in space",
     "recover": "write a clean file out of a damaged or unfinished one",
     "validate": "check a file against the rules of the format, access unit by access unit",
     "compare": "measure a decoded array against its original",
@@ -64,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(parsed: argparse.Namespace) -> int:
     try:
-        import_module(f"mvcodec.cli.{parsed.command}").run(parsed)
+        _module(parsed.command).run(parsed)
         sys.stdout.flush()
     except SettingError as error:
         return _fail(error, EXIT_USAGE)
@@ -87,8 +88,12 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
         # The options name the choices of the plug-in tables, whose import takes time: ask only the
         # command that is meant.
         if name in arguments:
-            import_module(f"mvcodec.cli.{name}").add_arguments(command)
+            _module(name).add_arguments(command)
     return parser
+
+
+def _module(command: str) -> Any:
+    return import_module(f"mvcodec.cli.{command.replace('-', '_')}")
 
 
 def _fail(error: object, code: int) -> int:

@@ -10,6 +10,7 @@ from typing import Any
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
 from mcap_protobuf.schema import build_file_descriptor_set
 
@@ -55,6 +56,12 @@ PROTOBUF_SCHEMAS: dict[str, tuple[str, bytes]] = {
 }
 """Kind of message -> (schema name, serialised FileDescriptorSet)."""
 
+
+DEPTH_SCHEMA = (
+    RawImage.DESCRIPTOR.full_name,
+    build_file_descriptor_set(RawImage).SerializeToString(),
+)
+"""The same of depth, which few files have."""
 
 VIDEO_FORMATS = {"h264": "h264", "hevc": "h265", "av1": "av1"}
 """The header's name of a codec -> foxglove.CompressedVideo's; a name not listed is itself."""
@@ -111,6 +118,22 @@ def compressed_video(frame: str, time_ns: int, data: bytes, codec: str) -> bytes
     """A serialised foxglove.CompressedVideo."""
     message = CompressedVideo(frame_id=frame, data=data, format=VIDEO_FORMATS.get(codec, codec))
     message.timestamp.FromNanoseconds(time_ns)
+    serialised: bytes = message.SerializeToString()
+    return serialised
+
+
+def depth_image(packet: Packet, width: int, height: int) -> bytes:
+    """A serialised foxglove.RawImage of depth: 16UC1, millimetres; 0 where it is unknown."""
+    assert packet.track.camera is not None
+    message = RawImage(
+        frame_id=frame_id(packet.track.camera),
+        width=width,
+        height=height,
+        encoding="16UC1",
+        step=2 * width,
+        data=packet.data,
+    )
+    message.timestamp.FromNanoseconds(packet.time_ns)
     serialised: bytes = message.SerializeToString()
     return serialised
 

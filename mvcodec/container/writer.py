@@ -35,6 +35,7 @@ class McapWriter:
         self._rig: tuple[schemas.RigMessage, ...] = ()
         self._video_topics: tuple[str, ...] = ()
         self._codec = ""
+        self._size = 0, 0
         self._closed = False
         self.frame_count = 0
 
@@ -47,7 +48,7 @@ class McapWriter:
         if self._closed:
             raise StreamClosed("the file was closed; it takes no more packets")
         if not self._file.is_open:
-            self._start(packets[0])
+            self._start(packets)
         first, file = packets[0], self._file
         keyframe = first.track == HEADER_TRACK
         file.begin_set(first.time_ns, keyframe)
@@ -59,7 +60,7 @@ class McapWriter:
                 for message in self._rig:
                     file.add(message.topic, packet.index, packet.time_ns, message.at(packet.time_ns))
             else:
-                data = schemas.video_message(packet, self._codec)
+                data = self._message(packet)
                 file.add(packet.track.topic, packet.index, packet.time_ns, data)
         self.frame_count += 1
         file.end_set()
@@ -83,12 +84,24 @@ class McapWriter:
     ) -> None:
         self.close()
 
-    def _start(self, first: Packet) -> None:
+    def _start(self, packets: Sequence[Packet]) -> None:
+        first = packets[0]
         header = StreamHeader.from_json(first.data)
         self._codec, self._rig = header.codec, schemas.rig_messages(header.array)
+        self._size = header.array.width, header.array.height
         self._file.open()
         self._add_channels(header)
+        for packet in packets:
+            if packet.track.kind is TrackKind.DEPTH:
+                name, schema = schemas.DEPTH_SCHEMA
+                channel = (MessageEncoding.Protobuf, name, SchemaEncoding.Protobuf, schema)
+                self._file.add_channel(packet.track.topic, *channel)
         self._file.add_metadata(METADATA_NAME, {"header": first.data.decode(), TOPICS_KEY: self._topics()})
+
+    def _message(self, packet: Packet) -> bytes:
+        if packet.track.kind is TrackKind.DEPTH:
+            return schemas.depth_image(packet, *self._size)
+        return schemas.video_message(packet, self._codec)
 
     def _add_channels(self, header: StreamHeader) -> None:
         self._video_topics = tuple(track.topic for track in header.tracks)

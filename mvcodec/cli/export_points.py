@@ -1,0 +1,69 @@
+"""``mvcodec export-points``: what the cameras see, as points in space."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from mvcodec.capture.manifest import read_calibration
+from mvcodec.cli.arguments import add_frames, add_output_options, positive_int
+from mvcodec.cli.progress import progress
+from mvcodec.cli.safety import add_limits, add_on_error
+from mvcodec.container.limits import Limits
+from mvcodec.container.point_writer import PointWriter
+from mvcodec.decoder import Decoder
+from mvcodec.depth import points_of, require_calibration
+from mvcodec.errors import OutputError, SettingError
+from mvcodec.output.ply import write_ply
+
+SUFFIXES = (".mcap", ".ply")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``export-points``."""
+    parser.add_argument("input", metavar="IN.mcap", help="or its URL")
+    parser.add_argument(
+        "output", type=Path, metavar="OUT", help="a .mcap file of all frames, or a .ply file of the first one"
+    )
+    parser.add_argument("--stride", type=positive_int, default=1, metavar="N", help="every Nth pixel")
+    parser.add_argument(
+        "--max-depth", type=float, default=float("inf"), metavar="M", help="leave out what is farther, metres"
+    )
+    parser.add_argument(
+        "--calibration", type=Path, metavar="FILE", help="JSON with the calibration as in array.json"
+    )
+    parser.add_argument("--nominal", action="store_true", help="accept nominal calibration")
+    add_frames(parser, "frames of the file to export")
+    add_on_error(parser, "stop")
+    add_limits(parser)
+    add_output_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Decode and write points."""
+    target: Path = arguments.output
+    suffix = target.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise SettingError("OUT", target, f"a name that ends in {' or '.join(SUFFIXES)}")
+    if target.is_dir():
+        raise OutputError(target, "it is a folder")
+    if target.resolve() == Path(arguments.input).resolve():
+        raise SettingError("OUT", target, "another file than IN.mcap")
+    limits = Limits(**dict(arguments.limit))
+    with (
+        Decoder.open(arguments.input, arguments.frames, arguments.on_error, limits) as decoder,
+        progress("export", None, quiet=arguments.quiet) as bar,
+        PointWriter(target) as writer,
+    ):
+        array = decoder.header.array
+        if arguments.calibration is not None:
+            array = replace(array, calibration=read_calibration(arguments.calibration))
+        require_calibration(array, arguments.nominal)
+        for decoded in decoder:
+            points = points_of(replace(decoded, array=array), arguments.stride, arguments.max_depth)
+            if suffix == ".ply":
+                write_ply(target, points)
+                break
+            writer.push(decoded.index, decoded.time_ns, points.places_m, points.colours)
+            bar.update()
