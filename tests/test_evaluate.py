@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -168,6 +169,15 @@ def test_other_settings_are_measured_anew(array: Path, measured: Path, tmp_path:
     assert maps[1][0] < maps[0][0]
 
 
+@pytest.fixture
+def heeding_ctrl_c() -> Iterator[None]:
+    """Let commands started here heed SIGINT: a shell's background jobs, as tests may be, inherit none."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heeding_ctrl_c")
 def test_an_interrupted_run_goes_on_where_it_stopped(array: Path, tmp_path: Path) -> None:
     # Enough points that a busy machine cannot be through with them before the signal comes.
     qps = [str(qp) for qp in range(12, 48, 2)]
