@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap, Mask
-from mvcodec.kernels import view_colour, view_depth
+from mvcodec.kernels import view_colour, view_depth, view_holes
 from mvcodec.synthesis.layered import LayeredSettings
 
 SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11), (14, 8)]
@@ -261,6 +261,6 @@ def test_paint_holes(seed: int, shape: Shape, holes: float, reach: int) -> None:
     seen_by = (rng.random(shape) >= holes).astype(np.uint8)
     picture[seen_by == 0] = 0
     expected = twins.paint_holes(picture, disparity, seen_by, 1.5, reach)
-    view_colour.paint_holes(picture, disparity, seen_by, 1.5, reach)
+    view_holes.paint_holes(picture, disparity, seen_by, 1.5, reach)
     assert np.abs(picture.astype(int) - expected).max() <= 1
     np.testing.assert_array_equal(picture[seen_by > 0], expected[seen_by > 0])

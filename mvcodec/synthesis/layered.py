@@ -214,7 +214,7 @@ class Layered:
         weights: NDArray[np.float32],
         disparity: FloatMap,
     ) -> tuple[Picture, NDArray[np.uint8]]:
-        from mvcodec.kernels import view_colour
+        from mvcodec.kernels import view_colour, view_holes
 
         settings = self.settings
         pixels: Picture = np.empty((*disparity.shape, 3), np.uint8)
@@ -234,7 +234,7 @@ class Layered:
             pixels,
             seen_by,
         )
-        view_colour.paint_holes(pixels, disparity, seen_by, settings.tolerance_px, settings.hole_reach_px)
+        view_holes.paint_holes(pixels, disparity, seen_by, settings.tolerance_px, settings.hole_reach_px)
         return pixels, seen_by
 
     def _bands(self, height: int, kernel: Callable[..., None], *arguments: object) -> None:
