@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-COMMAND = (sys.executable, "-m", "mvcodec.cli.main")
+COMMAND = (sys.executable, "-m", "mvcodec")
 
 
 def mvcodec(*arguments: str | Path, stdin: bytes | None = None) -> subprocess.CompletedProcess[str]:

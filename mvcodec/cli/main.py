@@ -119,7 +119,3 @@ def _show_warning(
 
 def _one_line(message: object) -> str:
     return " ".join(str(message).split())
-
-
-if __name__ == "__main__":
-    sys.exit(main())
