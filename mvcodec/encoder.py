@@ -114,6 +114,11 @@ class EncoderConfig:
             return self.disparity_scale
         return default_disparity_scale(self.quality, self.codec, array.width, array.height)
 
+    def median_for(self, array: CameraArray) -> int:
+        """The window of the median for the maps of an array, px; 0: none."""
+        given = self.disparity_median
+        return MEDIANS[self.scale_for(array)] if given is None else given
+
     def rate_of_pictures(self, array: CameraArray) -> RateControl:
         """The rate control of one camera's pictures."""
         if self.bitrate_kbps is None:
@@ -140,12 +145,16 @@ class Encoder:
     Args:
         array: the geometry; only its real cameras are coded.
         config: settings; EncoderConfig() by default.
+        matcher: asked in place of config's own (such as one that remembers what that one found); the
+            header names config's.
 
     Raises:
         SettingError: a setting does not fit the array, or names an unknown matcher or preset.
     """
 
-    def __init__(self, array: CameraArray, config: EncoderConfig | None = None) -> None:
+    def __init__(
+        self, array: CameraArray, config: EncoderConfig | None = None, matcher: Matcher | None = None
+    ) -> None:
         self.array = array
         self.config = config or EncoderConfig()
         longest = default_gop(array.fps)
@@ -154,10 +163,9 @@ class Encoder:
             raise SettingError(
                 "gop", self._gop, f"1..{longest} (a keyframe each second at {array.fps:g} fps)"
             )
-        self._matcher = _matcher(self.config.matcher)
+        self._matcher = matcher or find_matcher(self.config.matcher)
         self._scale = self.config.scale_for(array)
-        given = self.config.disparity_median
-        self._median = MEDIANS[self._scale] if given is None else given
+        self._median = self.config.median_for(array)
         size = even_size(array.width, array.height)
         self._encoders = self._make_encoders(TrackKind.TEXTURE, size, self.config.rate_of_pictures(array))
         self._header: StreamHeader | None = None
@@ -340,7 +348,12 @@ def _packet(track: Track, frames: FrameSet, coded: list[CodedPicture]) -> Packet
     return Packet(track, frames.index, frames.time_ns, picture.keyframe, picture.data)
 
 
-def _matcher(matcher: str | Matcher) -> Matcher:
+def find_matcher(matcher: str | Matcher) -> Matcher:
+    """What `EncoderConfig.matcher` stands for.
+
+    Raises:
+        SettingError: there is none of that name.
+    """
     if not isinstance(matcher, str):
         return matcher
     from mvcodec.layers.refinement import matcher_by_name

@@ -15,8 +15,10 @@ from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import InputError
 from mvcodec.evaluation.points import BitsSplit, CurvePoint
 from mvcodec.evaluation.quality import Comparison, QualityMeter
+from mvcodec.evaluation.remembered import Remembered
 from mvcodec.evaluation.stopwatch import Stopwatch
 from mvcodec.frames import DecodedSet, FrameSet, Picture
+from mvcodec.stereo.matcher import Matcher
 from mvcodec.synthesis.synthesizer import Synthesizer
 
 THREADS = 2
@@ -28,6 +30,7 @@ def measure_chain(
     source: ArraySource,
     chosen: range,
     config: EncoderConfig,
+    matcher: Remembered,
     synthesizer: Synthesizer,
     file: Path,
     on_picture: Callable[[], object],
@@ -37,6 +40,7 @@ def measure_chain(
     Args:
         chosen: frame numbers of the input, consecutive.
         config: with a constant qp.
+        matcher: new for each call; finds what config's matcher finds.
         file: written complete or not at all; its folder exists.
         on_picture: called after each picture that was measured.
 
@@ -47,7 +51,7 @@ def measure_chain(
     encoding, decoding = Stopwatch(), Stopwatch()
     part = file.with_suffix(".part")
     try:
-        encode_into(part, source, chosen, config, encoding)
+        encode_into(part, source, chosen, config, matcher, encoding)
         part.replace(file)
     finally:
         part.unlink(missing_ok=True)
@@ -59,18 +63,19 @@ def measure_chain(
         kbps=bits.total * source.array.fps / len(chosen) / 1000,
         quality=_measure(source, chosen, file, synthesizer, decoding, on_picture),
         split=BitsSplit(bits.texture, bits.disparity, bits.other),
-        encode_seconds=encoding.seconds,
+        encode_seconds=encoding.seconds + matcher.spared_seconds,
         decode_seconds=decoding.seconds,
+        match_seconds=matcher.seconds,
         file=file.name,
         settings=info.header.settings,
     )
 
 
 def encode_into(
-    path: Path, source: ArraySource, chosen: range, config: EncoderConfig, clock: Stopwatch
+    path: Path, source: ArraySource, chosen: range, config: EncoderConfig, matcher: Matcher, clock: Stopwatch
 ) -> None:
     """Code the chosen frames into a file; the clock runs while the encoder works."""
-    with McapWriter(path) as writer, Encoder(source.array, config) as encoder:
+    with McapWriter(path) as writer, Encoder(source.array, config, matcher) as encoder:
         for frame_set in source.frame_sets(slice(chosen.start, chosen.stop)):
             with clock:
                 packets = encoder.push(frame_set)

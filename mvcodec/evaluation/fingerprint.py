@@ -13,8 +13,11 @@ from mvcodec.capture import ArraySource
 
 PACKAGE = Path(mvcodec.__file__).parent
 
-CHAIN = ("*.py", "capture", "stereo", "layers", "video", "container", "synthesis", "kernels")
-"""The rooms that a point of mvcodec's own curve depends on."""
+CHAIN = (
+    *("*.py", "capture", "stereo", "layers", "video", "container", "synthesis", "kernels"),
+    *(f"evaluation/{name}.py" for name in ("chain", "metrics", "quality", "remembered")),
+)
+"""The rooms, and files of this one, that a point of mvcodec's own curve depends on."""
 
 ANCHORS_REVISION = 1
 """Raised with each change that gives an anchor other bits or figures from the same encoder options.

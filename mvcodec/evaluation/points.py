@@ -38,7 +38,11 @@ class CurvePoint:
         bits: of all frame sets.
         kbps: the same, kbit/s.
         quality: of the decoded (and synthesised) views.
-        encode_seconds, decode_seconds: wall-clock seconds of the stages, without measuring.
+        encode_seconds, decode_seconds: wall-clock seconds of the stages, without measuring. Matching is
+            done once for all QPs of a run, and counted in each: where its maps were there already,
+            encode_seconds is what the encoder took without it, plus match_seconds. That may be a little
+            too much, since an encoder that matches codes its pictures meanwhile.
+        match_seconds: of matching alone, within encode_seconds; None for an anchor.
         file: name of the kept stream in the folder; None for an anchor.
         settings: the encoder's record in that stream's header; None for an anchor.
     """
@@ -52,6 +56,7 @@ class CurvePoint:
     decode_seconds: float
     file: str | None = None
     settings: Mapping[str, Any] | None = None
+    match_seconds: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """As ``report.json`` has it: without the single views."""
@@ -65,6 +70,8 @@ class CurvePoint:
             "encode_seconds": self.encode_seconds,
             "decode_seconds": self.decode_seconds,
         }
+        if self.match_seconds is not None:
+            document["match_seconds"] = self.match_seconds
         return document if self.settings is None else {**document, "settings": dict(self.settings)}
 
 

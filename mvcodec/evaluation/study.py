@@ -10,12 +10,13 @@ from functools import partial
 from typing import Any
 
 from mvcodec.capture import ArraySource
-from mvcodec.encoder import EncoderConfig, default_gop
+from mvcodec.encoder import EncoderConfig, default_gop, find_matcher
 from mvcodec.errors import OutputError, SettingError
 from mvcodec.evaluation.anchors import ANCHORS, SIMULCAST, Anchor, code_array, sequence_settings
 from mvcodec.evaluation.chain import measure_chain
 from mvcodec.evaluation.fingerprint import ANCHORS_REVISION, CHAIN, InputFacts, code_digest
 from mvcodec.evaluation.points import BitsSplit, CurvePoint, PointStore
+from mvcodec.evaluation.remembered import MapSpool, Remembered
 from mvcodec.synthesis.table import make_synthesizer
 from mvcodec.video.codec import RateControl
 from mvcodec.video.pyav import library_versions
@@ -36,7 +37,7 @@ class Study:
 
     Attributes:
         qps: of the pictures, on the scale of config.codec; ascending.
-        config: of the encoder; its qp is replaced by each of `qps`.
+        config: of the encoder; its qp is replaced by each of `qps`, and its matcher has a name.
         synthesizer: name.
         anchors: keys of ANCHORS. Simulcast without B-frames is measured in any case.
         anchor_codecs: keys of CODECS.
@@ -140,6 +141,7 @@ class StudyRun:
         self.study, self.source, self.chosen, self.facts, self.store = study, source, chosen, facts, store
         self._on_pictures = on_pictures
         self._stop = threading.Event()
+        self._maps = MapSpool(store.folder)
         self._chain_code = code_digest(CHAIN)
         self.gop = study.config.gop or default_gop(source.array.fps)
 
@@ -159,7 +161,7 @@ class StudyRun:
         """
         points: dict[str, list[CurvePoint]] = {}
         futures: dict[str, list[Future[CurvePoint]]] = {}
-        with ThreadPoolExecutor(self.study.jobs) as pool:
+        with ThreadPoolExecutor(self.study.jobs) as pool, self._maps:
             try:
                 for curve in self.study.curves:
                     if curve.anchor is None:
@@ -192,21 +194,35 @@ class StudyRun:
         )
         return {"codec": curve.codec, "gop": self.gop, **settings}
 
-    def _point(self, curve: Curve, qp: int) -> CurvePoint:
-        own = curve.anchor is None
-        depends_on = {
+    def depends_on(self, curve: Curve, qp: int) -> dict[str, Any]:
+        """All that a point depends on, as plain JSON values; automatic choices as they fall."""
+        found = {
             "curve": OURS if curve.anchor is None else curve.anchor.name,
             "options": self.options(curve, qp),
             "input": self.facts.digest,
-            "code": self._chain_code if own else ANCHORS_REVISION,
+            "code": ANCHORS_REVISION if curve.anchor else self._chain_code,
             "libraries": library_versions(),
         }
+        return found if curve.anchor else {**found, "maps": self._map_settings(qp)}
+
+    def _map_settings(self, qp: int) -> dict[str, Any]:
+        config, array = replace(self.study.config, qp=qp), self.source.array
+        span = config.disparity_range_px
+        return {
+            "scale": config.scale_for(array),
+            "median": config.median_for(array),
+            # Without a range the encoder estimates one from the pictures, and chooses by that.
+            "rate": None if span is None else asdict(config.rate_of_maps(array, span)),
+        }
+
+    def _point(self, curve: Curve, qp: int) -> CurvePoint:
+        depends_on = self.depends_on(curve, qp)
         name = self.store.name(depends_on)
         point = self.store.find(name)
         if point is not None:
             self._on_pictures(self._weight(curve) * len(self.chosen) * len(self.source.array.positions))
             return point
-        point = self._own_point(name, qp) if own else self._anchor_point(curve, qp)
+        point = self._anchor_point(curve, qp) if curve.anchor else self._own_point(name, qp)
         self.store.keep(name, point, depends_on)
         return point
 
@@ -219,6 +235,7 @@ class StudyRun:
             self.source,
             self.chosen,
             replace(self.study.config, qp=qp),
+            Remembered(find_matcher(self.study.config.matcher), self._maps),
             make_synthesizer(self.study.synthesizer),
             self.store.folder / f"{name}.mcap",
             partial(self._on_pictures, 1),
