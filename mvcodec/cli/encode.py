@@ -22,6 +22,7 @@ from mvcodec.cli.arguments import (
 from mvcodec.cli.encode_stream import Unfinished, add_stream_arguments, encode_stream, is_stream, open_target
 from mvcodec.cli.info import document, summary
 from mvcodec.cli.interrupt import deferred_interrupt
+from mvcodec.cli.live_view import add_live_view, live_view
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_chunk_ms, add_on_error
 from mvcodec.cli.standard_streams import STANDARD
@@ -30,6 +31,7 @@ from mvcodec.depth import require_calibration
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
 from mvcodec.frames import FrameSet
+from mvcodec.output.live_view import LiveView
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
 from mvcodec.stereo.table import MATCHERS
 from mvcodec.video.codec import PRESETS
@@ -117,6 +119,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--nominal", action="store_true", help="accept nominal calibration for --depth")
     add_chunk_ms(parser)
     add_on_error(parser, "stop")
+    add_live_view(parser)
     add_stream_arguments(parser)
     add_frames(parser, "frames of the input to code")
     add_output_options(parser, "print what the file holds as JSON")
@@ -151,7 +154,8 @@ def _encode_files(arguments: argparse.Namespace) -> None:
         )
         warnings.warn(text, MvCodecWarning, stacklevel=2)
     range_px = find_range(source, chosen, arguments.disparity_range)
-    _encode(source, array, chosen, replace(config, disparity_range_px=range_px), arguments)
+    with live_view(arguments) as view:
+        _encode(source, array, chosen, replace(config, disparity_range_px=range_px), arguments, view)
 
 
 def _encode(
@@ -160,8 +164,9 @@ def _encode(
     chosen: range,
     config: EncoderConfig,
     arguments: argparse.Namespace,
+    view: LiveView | None,
 ) -> None:
-    writer = open_target(arguments)
+    writer = open_target(arguments, view)
     try:
         with (
             deferred_interrupt() as interrupted,

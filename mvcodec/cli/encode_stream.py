@@ -15,13 +15,16 @@ from mvcodec.array import CameraArray
 from mvcodec.capture.manifest import read_calibration
 from mvcodec.capture.recording import Recording, RecordingSettings
 from mvcodec.cli.interrupt import deferred_interrupt
+from mvcodec.cli.live_view import live_view
 from mvcodec.cli.progress import progress
 from mvcodec.cli.standard_streams import STANDARD, standard_input, standard_output
 from mvcodec.container import McapWriter
+from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import FrameSet
 from mvcodec.live import LiveEncoding
+from mvcodec.output.live_view import LiveView
 
 SUFFIX = ".mcap"
 
@@ -60,17 +63,18 @@ def is_stream(arguments: argparse.Namespace) -> bool:
     return len(inputs) == 1 and (str(inputs[0]) == STANDARD or inputs[0].suffix.lower() == SUFFIX)
 
 
-def open_target(arguments: argparse.Namespace) -> McapWriter:
-    """The writer of OUT; frame sets go to standard output one by one."""
+def open_target(arguments: argparse.Namespace, view: LiveView | None) -> McapWriter:
+    """The writer of OUT, which the live view listens to; frame sets go to standard output one by one."""
+    chunk_ms: int | None = arguments.chunk_ms
     if str(arguments.output) == STANDARD:
-        return McapWriter(standard_output(), 0 if arguments.chunk_ms is None else arguments.chunk_ms)
-    return McapWriter(arguments.output, *(() if arguments.chunk_ms is None else (arguments.chunk_ms,)))
+        return McapWriter(standard_output(), 0 if chunk_ms is None else chunk_ms, view)
+    return McapWriter(arguments.output, CHUNK_MS if chunk_ms is None else chunk_ms, view)
 
 
 def encode_stream(arguments: argparse.Namespace, make_config: Callable[[CameraArray], EncoderConfig]) -> None:
     """Code frame sets as they come."""
     first, stop = _frames(arguments.frames)
-    with _opened(arguments) as source:
+    with live_view(arguments) as view, _opened(arguments) as source:
         config = make_config(source.array)
         span = arguments.disparity_range
         if isinstance(span, tuple):
@@ -78,13 +82,17 @@ def encode_stream(arguments: argparse.Namespace, make_config: Callable[[CameraAr
         if not source.array.calibration.given:
             text = f"{source.name}: no calibration given; nominal values stand in"
             warnings.warn(text, MvCodecWarning, stacklevel=2)
-        _run(arguments, source, config, islice(source.frame_sets(), first, stop))
+        _run(arguments, source, config, islice(source.frame_sets(), first, stop), view)
 
 
 def _run(
-    arguments: argparse.Namespace, source: Recording, config: EncoderConfig, frame_sets: Iterator[FrameSet]
+    arguments: argparse.Namespace,
+    source: Recording,
+    config: EncoderConfig,
+    frame_sets: Iterator[FrameSet],
+    view: LiveView | None,
 ) -> None:
-    writer = open_target(arguments)
+    writer = open_target(arguments, view)
     encoder = Encoder(source.array, config)
     live = LiveEncoding(encoder, writer, arguments.when_behind)
     try:

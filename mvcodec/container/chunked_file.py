@@ -8,7 +8,7 @@ import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, Protocol
 
 from mcap.writer import CompressionType, Writer
 
@@ -29,6 +29,22 @@ FULL_CHUNK_BYTES = 1 << 26
 LIBRARY = f"mvcodec {mvcodec.__version__}"
 
 
+class MessageListener(Protocol):
+    """Hears of all that goes into a file, in order; called by the thread that writes."""
+
+    def add_channel(self, topic: str, encoding: str, name: str, schema_encoding: str, schema: bytes) -> None:
+        """A topic was declared."""
+        ...
+
+    def begin_set(self, keyframe: bool) -> None:
+        """A frame set begins."""
+        ...
+
+    def add(self, topic: str, time_ns: int, data: bytes) -> None:
+        """A message was added."""
+        ...
+
+
 class ChunkedFile:
     """Writes messages, frame set by frame set: `open`, then `begin_set`, `add` ..., `end_set`.
 
@@ -36,17 +52,20 @@ class ChunkedFile:
         target: path, or an open binary file, which may be a pipe and stays open.
         chunk_ms: the most stream time that waits before it is written, 0..60000; with 0 each
             frame set is written at once.
+        listener: hears of all that is written.
 
     Raises:
         SettingError (at once): chunk_ms is outside its range.
         OutputError (from every method): the system refuses to open or write.
     """
 
-    def __init__(self, target: BinaryIO | Path, chunk_ms: int = CHUNK_MS) -> None:
+    def __init__(
+        self, target: BinaryIO | Path, chunk_ms: int = CHUNK_MS, listener: MessageListener | None = None
+    ) -> None:
         if not 0 <= chunk_ms <= MAX_CHUNK_MS:
             raise SettingError("chunk_ms", chunk_ms, f"0..{MAX_CHUNK_MS} ms")
         self._chunk_ns = chunk_ms * 1_000_000
-        self._target = target
+        self._target, self._listener = target, listener
         name = target if isinstance(target, Path) else getattr(target, "name", "output")
         self._name = "standard output" if name == 1 else str(name)
         self._file: io.BufferedWriter | None = None
@@ -88,6 +107,8 @@ class ChunkedFile:
         if name not in self._schemas:
             self._schemas[name] = mcap.register_schema(name, schema_encoding, schema)
         self.channels[topic] = mcap.register_channel(topic, encoding, self._schemas[name])
+        if self._listener is not None:
+            self._listener.add_channel(topic, encoding, name, schema_encoding, schema)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record before the chunk at hand."""
@@ -99,6 +120,8 @@ class ChunkedFile:
 
         A chunk starts at each keyframe, so that a reader reaches keyframes by the chunk index.
         """
+        if self._listener is not None:
+            self._listener.begin_set(keyframe)
         start = self._chunk_start_ns
         if start is not None and (
             keyframe or time_ns - start >= self._chunk_ns or self._chunk_bytes >= FULL_CHUNK_BYTES
@@ -111,6 +134,8 @@ class ChunkedFile:
         """Add a message to the frame set."""
         self._chunk_bytes += len(data)
         self._opened().add_message(self.channels[topic], time_ns, data, time_ns, sequence=index)
+        if self._listener is not None:
+            self._listener.add(topic, time_ns, data)
 
     def end_set(self) -> None:
         """End the frame set; without chunk time it is written now."""
@@ -140,7 +165,9 @@ class ChunkedFile:
         with self._writing():
             self._opened().flush()  # type: ignore[no-untyped-call]
             self._chunk_start_ns, self._chunk_bytes = None, 0
-            if isinstance(self._target, Path) and self._file is not None:
+            if not isinstance(self._target, Path):
+                self._target.flush()  # it may have a buffer of its own
+            elif self._file is not None:
                 descriptor = self._file.fileno()
                 if stat.S_ISREG(os.fstat(descriptor).st_mode):
                     os.fsync(descriptor)

@@ -11,7 +11,7 @@ from typing import BinaryIO, Self
 from mcap.well_known import MessageEncoding, SchemaEncoding
 
 from mvcodec.container import schemas
-from mvcodec.container.chunked_file import CHUNK_MS, ChunkedFile
+from mvcodec.container.chunked_file import CHUNK_MS, ChunkedFile, MessageListener
 from mvcodec.container.chunks import METADATA_NAME, TOPICS_KEY
 from mvcodec.errors import StreamClosed
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, TrackKind
@@ -24,14 +24,17 @@ class McapWriter:
         target: path, or an open binary file, which may be a pipe and stays open.
         chunk_ms: the most stream time that waits before it is written, 0..60000; with 0 each
             frame set is written at once.
+        listener: hears of every channel and message that goes into the file.
 
     Raises (from `push` and `close`):
         SettingError (at once): chunk_ms is outside its range.
         OutputError: the system refuses to open or write.
     """
 
-    def __init__(self, target: BinaryIO | Path, chunk_ms: int = CHUNK_MS) -> None:
-        self._file = ChunkedFile(target, chunk_ms)
+    def __init__(
+        self, target: BinaryIO | Path, chunk_ms: int = CHUNK_MS, listener: MessageListener | None = None
+    ) -> None:
+        self._file = ChunkedFile(target, chunk_ms, listener)
         self._rig: tuple[schemas.RigMessage, ...] = ()
         self._video_topics: tuple[str, ...] = ()
         self._codec = ""
