@@ -2,13 +2,36 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 import warnings
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 from fuzz_targets import CORPUS, TARGETS, seeds
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+SECONDS = 6
+"""Of each target: half a minute in all. `make fuzz` takes its time."""
+
+
+@pytest.mark.skipif(find_spec("atheris") is None, reason="no atheris for this system and Python")
+@pytest.mark.parametrize("target", TARGETS)
+def test_fuzzing_from_the_kept_corpus_finds_nothing(target: str, tmp_path: Path) -> None:
+    tool = Path(__file__).parents[1] / "tools" / "fuzz.py"
+    command = [sys.executable, str(tool), target, "--seconds", str(SECONDS)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    finds = {path.name: path.read_bytes().hex() for path in (tmp_path / "fuzz-finds").iterdir()}
+    assert (done.returncode, finds) == (0, {}), done.stderr[-4000:]
+    runs = re.search(r"number_of_executed_units: (\d+)", done.stderr)
+    covered = re.search(r"INITED cov: (\d+)", done.stderr)
+    assert runs is not None
+    assert int(runs[1]) > 2 * len(list((CORPUS / target).iterdir())), "more than the corpus once"
+    assert covered is not None, "coverage guides it"
+    assert int(covered[1]) > 50
 
 
 @pytest.mark.parametrize("target", TARGETS)
