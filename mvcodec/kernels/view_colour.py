@@ -11,10 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-BORDER = 2
-"""Pixels that `split_luma` repeats around a picture, so that a cubic fetch never leaves it."""
-CONTOUR = np.float32(-1e9)
-"""Stands, in a map of fetchable disparity, for a pixel whose cubic fetch would cross a depth edge."""
+from mvcodec.kernels.view_fetch import BORDER, CONTOUR, cubic, cubic_weights, linear, linear_edge
 
 FloatMap = NDArray[np.float32]
 ByteMap = NDArray[np.uint8]
@@ -41,82 +38,14 @@ def split_luma(picture: NDArray[np.uint8], luma: FloatMap, colour: NDArray[np.fl
             colour[y, x, 1] = blue - grey
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _keys(t, a):  # type: ignore[no-untyped-def]
-    """The four weights of cubic convolution at fraction t (Keys 1981, equation 15, parameter a)."""
-    s = np.float32(1) - t
-    inner = ((a + np.float32(2)) * t - (a + np.float32(3))) * t * t + np.float32(1)
-    after = ((a + np.float32(2)) * s - (a + np.float32(3))) * s * s + np.float32(1)
-    return a * t * s * s, inner, after, a * s * t * t
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _cubic(luma, place, stride, across, down):  # type: ignore[no-untyped-def]
-    """Luma of the 4 x 4 window whose upper left pixel is at the flat index `place`."""
-    one, two, three = np.uint32(1), np.uint32(2), np.uint32(3)
-    a, b, c, d = across
-    grey = down[0] * (
-        a * luma[place] + b * luma[place + one] + c * luma[place + two] + d * luma[place + three]
-    )
-    place += stride
-    grey += down[1] * (
-        a * luma[place] + b * luma[place + one] + c * luma[place + two] + d * luma[place + three]
-    )
-    place += stride
-    grey += down[2] * (
-        a * luma[place] + b * luma[place + one] + c * luma[place + two] + d * luma[place + three]
-    )
-    place += stride
-    grey += down[3] * (
-        a * luma[place] + b * luma[place + one] + c * luma[place + two] + d * luma[place + three]
-    )
-    return grey
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _linear(colour, place, stride, part_x, part_y):  # type: ignore[no-untyped-def]
-    """(R - Y, B - Y) between the four pixels whose upper left one is at the flat index `place`."""
-    one_x, one_y = np.float32(1) - part_x, np.float32(1) - part_y
-    a, b, c, d = one_x * one_y, part_x * one_y, one_x * part_y, part_x * part_y
-    top = np.uint32(2) * place
-    low = top + np.uint32(2) * stride
-    one, two, three = np.uint32(1), np.uint32(2), np.uint32(3)
-    red = a * colour[top] + b * colour[top + two] + c * colour[low] + d * colour[low + two]
-    blue = a * colour[top + one] + b * colour[top + three] + c * colour[low + one] + d * colour[low + three]
-    return red, blue
-
-
-@njit(cache=True, nogil=True)
-def _fetch_edge(luma, colour, disparity, x, y, d, tolerance):  # type: ignore[no-untyped-def]
-    """(share, Y, R - Y, B - Y) at (x, y) from those of the four pixels around it that lie at disparity d."""
-    height, width = disparity.shape
-    left, top = int(x), int(y)
-    part_x, part_y = x - np.float32(left), y - np.float32(top)
-    share = grey = red = blue = np.float32(0)
-    for j in range(2):
-        for i in range(2):
-            u, v = min(left + i, width - 1), min(top + j, height - 1)
-            if abs(disparity[v, u] - d) <= tolerance:
-                part = (part_x if i else np.float32(1) - part_x) * (part_y if j else np.float32(1) - part_y)
-                share += part
-                grey += part * luma[v + BORDER, u + BORDER]
-                red += part * colour[v + BORDER, u + BORDER, 0]
-                blue += part * colour[v + BORDER, u + BORDER, 1]
-    if share > np.float32(1e-3):
-        return share, grey / share, red / share, blue / share
-    return np.float32(0), grey, red, blue
-
-
 @njit(cache=True, nogil=True)
 def _see(x, y, d, cameras, planes, shifts, weights, tolerance, edge_trust, sharpness):  # type: ignore[no-untyped-def]
-    """What the cameras see of the view's point (x, y) at disparity d: (weight, Y, R - Y, B - Y, cameras)."""
-    lumas, colours, disparities, fetchable = planes
+    """What the cameras see of the view's point (x, y) at disparity d: sums of weight, Y, R - Y, B - Y."""
+    luma, colour, disparities, fetchable = planes
     _, height, width = disparities.shape
-    stride = np.uint32(width + 2 * BORDER)
+    stride = width + 2 * BORDER
     total = grey = red = blue = np.float32(0)
-    seen = 0
     for i in range(cameras.size):
-        camera = cameras[i]
         at_x = np.float32(x) + shifts[i, 0] * d
         at_y = np.float32(y) + shifts[i, 1] * d
         if not (-0.5 < at_x < width - 0.5 and -0.5 < at_y < height - 0.5):
@@ -124,41 +53,55 @@ def _see(x, y, d, cameras, planes, shifts, weights, tolerance, edge_trust, sharp
         at_x = min(max(at_x, np.float32(0)), np.float32(width - 1))
         at_y = min(max(at_y, np.float32(0)), np.float32(height - 1))
         left, top = int(at_x), int(at_y)
-        here = fetchable[camera, top + BORDER, left + BORDER]
-        if here > CONTOUR:
-            if abs(here - d) > tolerance:
-                continue
-            part_x, part_y = at_x - np.float32(left), at_y - np.float32(top)
-            place = np.uint32((top + BORDER) * stride + left + BORDER)
-            part = weights[i]
-            y_here = _cubic(
-                lumas[camera].ravel(),
-                place - stride - np.uint32(1),
-                stride,
-                _keys(part_x, sharpness),
-                _keys(part_y, sharpness),
-            )
-            red_here, blue_here = _linear(colours[camera].ravel(), place, stride, part_x, part_y)
-        else:
-            share, y_here, red_here, blue_here = _fetch_edge(
-                lumas[camera], colours[camera], disparities[camera], at_x, at_y, d, tolerance
+        part_x, part_y = at_x - np.float32(left), at_y - np.float32(top)
+        place = (cameras[i] * (height + 2 * BORDER) + top + BORDER) * stride + left + BORDER
+        here = fetchable[np.uintp(place)]
+        part = weights[i]
+        if here == CONTOUR:
+            share, y_here, red_here, blue_here = linear_edge(
+                luma, colour, disparities[cameras[i]], place, left, top, part_x, part_y, d, tolerance
             )
             if share == 0:
                 continue
             part = share * weights[i] * edge_trust
+        elif abs(here - d) > tolerance:
+            continue
+        else:
+            y_here = cubic(
+                luma,
+                np.uintp(place - stride - 1),
+                np.uintp(stride),
+                cubic_weights(part_x, sharpness),
+                cubic_weights(part_y, sharpness),
+            )
+            red_here, blue_here = linear(colour, np.uintp(place), np.uintp(stride), part_x, part_y)
         total += part
         grey += part * y_here
         red += part * red_here
         blue += part * blue_here
-        seen += 1
-    return total, grey, red, blue, seen
+    return total, grey, red, blue
 
 
 @njit(cache=True, nogil=True)
 def _blend_contour(  # type: ignore[no-untyped-def]
-    x, y, view_disparity, cameras, planes, shifts, weights, tolerance, edge_trust, sharpness, surface, part
+    x,
+    y,
+    own,
+    view_disparity,
+    cameras,
+    planes,
+    shifts,
+    weights,
+    tolerance,
+    edge_trust,
+    sharpness,
+    surface,
+    part,
 ):
-    """(known, Y, R - Y, B - Y, cameras) of one pixel, from every surface of its 3 x 3 window."""
+    """(Y, R - Y, B - Y) of one pixel from every surface of its 3 x 3 window.
+
+    `own` is what `_see` gives for the pixel's own surface; `surface` and `part` are room for nine.
+    """
     height, width = view_disparity.shape
     surface[0], part[0] = view_disparity[y, x], np.float32(1)
     count = 1
@@ -174,34 +117,27 @@ def _blend_contour(  # type: ignore[no-untyped-def]
             if v != y or u != x:
                 part[k] += np.float32(1) / np.float32(1 + (u - x) * (u - x) + (v - y) * (v - y))
     total = grey = red = blue = np.float32(0)
-    cameras_here = 0
     for k in range(count):
-        weight, y_here, red_here, blue_here, seen = _see(
-            x, y, surface[k], cameras, planes, shifts, weights, tolerance, edge_trust, sharpness
-        )
-        if k == 0:
-            if weight == 0:  # with its neighbours' colour alone it would spread that into holes beside it
-                return False, grey, red, blue, 0
-            cameras_here = seen
+        weight, y_here, red_here, blue_here = own
+        if k > 0:
+            weight, y_here, red_here, blue_here = _see(
+                x, y, surface[k], cameras, planes, shifts, weights, tolerance, edge_trust, sharpness
+            )
         if weight > 0:
             scale = part[k] / weight
             total += part[k]
             grey += scale * y_here
             red += scale * red_here
             blue += scale * blue_here
-    return True, grey / total, red / total, blue / total, cameras_here
+    return grey / total, red / total, blue / total
 
 
 @njit(cache=True, nogil=True)
-def _add_luma(  # type: ignore[no-untyped-def]
-    y, disparity, camera, shape, shift, weight, tolerance, sharpness, places, parts, keys, slow, taken, grey
-):
-    """Add a camera's weighted luma to one row; `taken` says where it saw the view's surface."""
-    luma, fetchable = camera
+def _locate(y, disparity, shift, shape, places, parts):  # type: ignore[no-untyped-def]
+    """Where a camera sees one row of the view: the pixels up left of there, -1 outside, and the fractions."""
     height, width = shape
-    stride = width + 2 * BORDER
+    stride = np.int32(width + 2 * BORDER)
     shift_x, shift_y = shift
-    across, down = keys[:4], keys[4:]
     for x in range(width):
         at_x = np.float32(x) + shift_x * disparity[x]
         at_y = np.float32(y) + shift_y * disparity[x]
@@ -215,40 +151,88 @@ def _add_luma(  # type: ignore[no-untyped-def]
         at_y = min(max(at_y, np.float32(0)), np.float32(height - 1))
         left, top = np.int32(at_x), np.int32(at_y)
         parts[0, x], parts[1, x] = at_x - np.float32(left), at_y - np.float32(top)
-        across[0, x], across[1, x], across[2, x], across[3, x] = _keys(parts[0, x], sharpness)
-        down[0, x], down[1, x], down[2, x], down[3, x] = _keys(parts[1, x], sharpness)
-        place = (top + np.int32(BORDER)) * np.int32(stride) + left + np.int32(BORDER)
-        places[x] = place if inside else -1
-    lines = np.uint32(stride)
-    one = np.uint32(1)
-    for x in range(width):
-        taken[x] = 0
-        if slow[x] or places[x] < 0:
-            continue
-        here = fetchable[np.uint32(places[x])]
-        if abs(here - disparity[x]) > tolerance:
-            slow[x] = here == CONTOUR
-            continue
-        taken[x] = weight
-        grey[x] += weight * _cubic(
-            luma,
-            np.uint32(places[x]) - lines - one,
-            lines,
-            (across[0, x], across[1, x], across[2, x], across[3, x]),
-            (down[0, x], down[1, x], down[2, x], down[3, x]),
-        )
+        place = (top + np.int32(BORDER)) * stride + left + np.int32(BORDER)
+        places[x] = place if inside else np.int32(-1)
 
 
 @njit(cache=True, nogil=True)
-def _add_colour(colour, width, places, parts, slow, taken, red, blue):  # type: ignore[no-untyped-def]
-    """Add a camera's weighted colour differences to one row."""
-    stride = np.uint32(width + 2 * BORDER)
-    for x in range(width):
-        if slow[x] or taken[x] == 0:
-            continue
-        red_here, blue_here = _linear(colour, np.uint32(places[x]), stride, parts[0, x], parts[1, x])
-        red[x] += taken[x] * red_here
-        blue[x] += taken[x] * blue_here
+def _choose(disparity, fetchable, first, tolerance, places, clear, edges):  # type: ignore[no-untyped-def]
+    """Lists the pixels of a row whose surface the camera sees, and those at its contours; their numbers."""
+    seen = contours = 0
+    for x in range(disparity.size):  # without a branch: which way it would go is hard to foresee
+        inside = places[x] >= 0
+        here = fetchable[first + np.uintp(max(places[x], 0))]
+        clear[seen] = x
+        seen += inside & (abs(here - disparity[x]) <= tolerance)
+        edges[contours] = x
+        contours += inside & (here == CONTOUR)
+    return seen, contours
+
+
+@njit(cache=True, nogil=True)
+def _weigh(parts, sharpness, keys):  # type: ignore[no-untyped-def]
+    """The four weights of a cubic fetch across and the four down, for each pixel of a row."""
+    for axis in range(2):
+        part = parts[axis]
+        first, second, third, fourth = keys[axis, 0], keys[axis, 1], keys[axis, 2], keys[axis, 3]
+        for x in range(part.size):  # two by two, since with more arrays it does not compile to vectors
+            first[x], second[x], _, _ = cubic_weights(part[x], sharpness)
+        for x in range(part.size):
+            _, _, third[x], fourth[x] = cubic_weights(part[x], sharpness)
+
+
+@njit(cache=True, nogil=True)
+def _add_clear(  # type: ignore[no-untyped-def]
+    luma, colour, first, stride, weight, chosen, places, parts, keys, sums, seen
+):
+    """Add what a camera sees at the chosen pixels of a row, by its weight."""
+    total, grey, red, blue = sums
+    across, down = keys[0], keys[1]
+    for k in range(chosen.size):
+        x = np.uintp(chosen[k])
+        place = first + np.uintp(places[x])
+        grey[x] += weight * cubic(
+            luma,
+            place - stride - np.uintp(1),
+            stride,
+            (across[0, x], across[1, x], across[2, x], across[3, x]),
+            (down[0, x], down[1, x], down[2, x], down[3, x]),
+        )
+        red_here, blue_here = linear(colour, place, stride, parts[0, x], parts[1, x])
+        red[x] += weight * red_here
+        blue[x] += weight * blue_here
+        total[x] += weight
+        seen[x] += 1
+
+
+@njit(cache=True, nogil=True)
+def _add_edges(  # type: ignore[no-untyped-def]
+    luma, colour, own, first, disparity, weight, tolerance, chosen, places, parts, sums, seen, mixed
+):
+    """Add what a camera sees at the chosen pixels of a row, at its contours; weight: (own, edge_trust)."""
+    total, grey, red, blue = sums
+    stride = own.shape[1] + 2 * BORDER
+    for x in chosen:
+        mixed[x] = True
+        share, y_here, red_here, blue_here = linear_edge(
+            luma,
+            colour,
+            own,
+            first + places[x],
+            places[x] % stride - BORDER,
+            places[x] // stride - BORDER,
+            parts[0, x],
+            parts[1, x],
+            disparity[x],
+            tolerance,
+        )
+        if share > 0:
+            part = share * weight[0] * weight[1]
+            total[x] += part
+            grey[x] += part * y_here
+            red[x] += part * red_here
+            blue[x] += part * blue_here
+            seen[x] += 1
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -296,68 +280,80 @@ def blend(
         out: uint8 (H, W, 3) RGB, rows first..last-1 overwritten; black where no camera sees the pixel.
         seen_by: uint8 (H, W), overwritten with the number of cameras; 0 where none sees the pixel.
     """
-    lumas, colours, _, fetchable = planes
+    luma, colour, fetchable = planes[0].ravel(), planes[1].ravel(), planes[3].ravel()
+    disparities = planes[2]
     shape = view_disparity.shape
-    width = shape[1]
+    height, width = shape
+    stride = width + 2 * BORDER
+    plane = (height + 2 * BORDER) * stride
     near_px, trust, keys_a = np.float32(tolerance), np.float32(edge_trust), np.float32(sharpness)
     surface, part = np.empty(9, np.float32), np.empty(9, np.float32)
-    keys, parts = np.empty((8, width), np.float32), np.empty((2, width), np.float32)
-    places = np.empty(width, np.int32)
-    taken, total = np.empty(width, np.float32), np.empty(width, np.float32)
-    grey, red, blue = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
-    slow = np.empty(width, np.bool_)
+    keys, parts = np.empty((2, 4, width), np.float32), np.empty((2, width), np.float32)
+    places, clear, edges = np.empty(width, np.int32), np.empty(width, np.int32), np.empty(width, np.int32)
+    total, grey = np.empty(width, np.float32), np.empty(width, np.float32)
+    red, blue = np.empty(width, np.float32), np.empty(width, np.float32)
+    sums = total, grey, red, blue
+    mixed = np.empty(width, np.bool_)
     for y in range(first, last):
         disparity, seen = view_disparity[y], seen_by[y]
-        grey[:] = 0
-        red[:] = 0
-        blue[:] = 0
-        total[:] = 0
+        for values in sums:
+            values[:] = 0
         seen[:] = 0
         for x in range(width):
-            slow[x] = contours[y, x] != 0
+            mixed[x] = contours[y, x] != 0
         for i in range(cameras.size):
-            camera = cameras[i]
-            shift = (shifts[i, 0], shifts[i, 1])
-            _add_luma(
-                y,
-                disparity,
-                (lumas[camera].ravel(), fetchable[camera].ravel()),
-                shape,
-                shift,
+            start = cameras[i] * plane
+            _locate(y, disparity, (shifts[i, 0], shifts[i, 1]), shape, places, parts)
+            some, few = _choose(disparity, fetchable, np.uintp(start), near_px, places, clear, edges)
+            _weigh(parts, keys_a, keys)
+            _add_clear(
+                luma,
+                colour,
+                np.uintp(start),
+                np.uintp(stride),
                 weights[i],
-                near_px,
-                keys_a,
+                clear[:some],
                 places,
                 parts,
                 keys,
-                slow,
-                taken,
-                grey,
+                sums,
+                seen,
             )
-            _add_colour(colours[camera].ravel(), width, places, parts, slow, taken, red, blue)
-            for x in range(width):
-                total[x] += taken[x]
-                seen[x] += taken[x] > 0
+            _add_edges(
+                luma,
+                colour,
+                disparities[cameras[i]],
+                start,
+                disparity,
+                (weights[i], trust),
+                near_px,
+                edges[:few],
+                places,
+                parts,
+                sums,
+                seen,
+                mixed,
+            )
         for x in range(width):
-            if total[x] > 0 and not slow[x]:
+            if total[x] == 0:  # with its neighbours' colour alone it would spread that into holes beside it
+                out[y, x] = 0
+            elif not mixed[x]:
                 scale = np.float32(1) / total[x]
                 _store(out[y, x], scale * grey[x], scale * red[x], scale * blue[x])
-                continue
-            known, y_here, red_here, blue_here, seen[x] = _blend_contour(
-                x,
-                y,
-                view_disparity,
-                cameras,
-                planes,
-                shifts,
-                weights,
-                near_px,
-                trust,
-                keys_a,
-                surface,
-                part,
-            )
-            if known:
-                _store(out[y, x], y_here, red_here, blue_here)
             else:
-                out[y, x] = 0
+                y_here, red_here, blue_here = _blend_contour(
+                    x,
+                    y,
+                    (total[x], grey[x], red[x], blue[x]),
+                    view_disparity,
+                    cameras,
+                    (luma, colour, disparities, fetchable),
+                    shifts,
+                    weights,
+                    near_px,
+                    trust,
+                    keys_a,
+                    surface,
+                    part,
+                )
+                _store(out[y, x], y_here, red_here, blue_here)
