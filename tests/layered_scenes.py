@@ -14,7 +14,7 @@ from plane_scene import Plane, PlaneScene
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture.scene import RoomScene, SceneSettings
 from mvcodec.frames import DecodedSet, DisparityMap, FloatMap, Mask, Picture, RenderedView
-from mvcodec.synthesis.layered import Layered, LayeredSettings
+from mvcodec.synthesis.layered import Layered
 
 LAYERED = Layered()
 
@@ -51,7 +51,7 @@ def contours(disparity: FloatMap) -> Mask:
 def used(array: CameraArray, viewpoint: Viewpoint) -> list[Position]:
     """The cameras of the view's cell that count."""
     cameras = array.cell_at(viewpoint).cameras
-    return [c for c in cameras if twins.camera_weight(array, c, viewpoint, LayeredSettings()) > 0]
+    return [c for c in cameras if twins.camera_weight(array, c, viewpoint, 1.0) > 0]
 
 
 def seen_by_any(scene: PlaneScene, viewpoint: Viewpoint, cameras: Collection[Position]) -> Mask:

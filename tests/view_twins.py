@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.frames import DecodedSet, FloatMap, Mask, Picture
+from mvcodec.synthesis.camera_spread import measure_spread
 from mvcodec.synthesis.layered import FADE, LayeredSettings
 
 UNKNOWN = -1e9
@@ -224,14 +225,12 @@ def median3(disparity: FloatMap) -> FloatMap:
     return np.asarray(np.median(windows, axis=(2, 3)), np.float32)
 
 
-def camera_weight(
-    array: CameraArray, camera: Position, viewpoint: Viewpoint, settings: LayeredSettings
-) -> float:
+def camera_weight(array: CameraArray, camera: Position, viewpoint: Viewpoint, camera_spread: float) -> float:
     """1 / (spread + squared distance in cells), less towards a border with a cell that lacks this camera."""
     cell = array.cell_at(viewpoint)
     down = abs(viewpoint.row - camera[0]) / (array.row_step or 1)
     across = abs(viewpoint.col - camera[1]) / (array.col_step or 1)
-    weight = 1 / (settings.spread + across**2 + down**2)
+    weight = 1 / (camera_spread + across**2 + down**2)
     for distance, place, first, last, end in (
         (down, camera[0], cell.top, cell.bottom, array.rows - 1),
         (across, camera[1], cell.left, cell.right, array.cols - 1),
@@ -246,9 +245,10 @@ def render(
 ) -> tuple[NDArray[np.float64], FloatMap, NDArray[np.uint8], Mask]:
     """A whole view between cameras: RGB not yet rounded, disparity, seen_by, and which pixels are painted."""
     array = decoded.array
+    camera_spread = settings.spread or measure_spread(decoded)
     sources = []
     for camera in array.cell_at(viewpoint).cameras:
-        weight = camera_weight(array, camera, viewpoint, settings)
+        weight = camera_weight(array, camera, viewpoint, camera_spread)
         if weight > 0:
             shift = array.shift_per_disparity(camera, viewpoint)
             disparity = decoded.disparities[camera].values_px

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from mvcodec.array import CameraArray, Cell, Position, Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, FloatMap, Picture, RenderedView
+from mvcodec.synthesis.camera_spread import measure_spread
 
 THREADS = 2
 FADE = 0.25
@@ -37,8 +38,9 @@ class LayeredSettings:
         ratio: cameras behind a farther surface must weigh this many times those of a nearer one to
             outvote it, at least 1.
         reach_px: how far a moved pixel covers its surroundings, px, 0.5..1.
-        spread: cells; a camera at distance b counts 1 / (spread + b^2), so that more cameras are
-            averaged (less noise, more blur) with a larger one, above 0.
+        spread: squared cells; a camera at distance b counts 1 / (spread + b^2), so that more cameras are
+            averaged (less noise, more blur) with a larger one, above 0. None: as the pictures ask for,
+            see `mvcodec.synthesis.camera_spread`.
         edge_trust: weight of pixels fetched at a camera's contours, above 0 and at most 1.
         sharpness: Keys' parameter a of the cubic fetch, -1..0.
         hole_reach_px: how far holes are painted from, px, at least 1.
@@ -50,7 +52,7 @@ class LayeredSettings:
     tolerance_px: float = 1.5
     ratio: float = 1.3
     reach_px: float = 0.58
-    spread: float = 0.2
+    spread: float | None = None
     edge_trust: float = 0.5
     sharpness: float = -0.65
     hole_reach_px: int = 64
@@ -66,7 +68,7 @@ class LayeredSettings:
             ("hole_reach_px", 1, 4096),
         ):
             value = getattr(self, name)
-            if not low <= value <= high:
+            if value is not None and not low <= value <= high:
                 raise SettingError(f"LayeredSettings.{name}", value, f"{low}..{high}")
 
 
@@ -76,12 +78,13 @@ class _Sources:
     The arrays are those of `kernels.view_colour.blend`, indexed by place in `array.real`.
     """
 
-    def __init__(self, decoded: DecodedSet) -> None:
+    def __init__(self, decoded: DecodedSet, spread: float | None) -> None:
         from mvcodec.kernels.view_colour import BORDER
 
         height, width, count = decoded.array.height, decoded.array.width, len(decoded.array.real)
         padded = (count, height + 2 * BORDER, width + 2 * BORDER)
         self.decoded = decoded
+        self.spread = measure_spread(decoded) if spread is None else spread
         self.lumas = np.empty(padded, np.float32)
         self.colours = np.empty((*padded, 2), np.float32)
         self.disparities = np.empty((count, height, width), np.float32)
@@ -125,6 +128,26 @@ def _spread(disparity: FloatMap, size: int) -> FloatMap:
     return np.asarray(nearest - farthest, np.float32)
 
 
+def _weight(array: CameraArray, cell: Cell, camera: Position, viewpoint: Viewpoint, spread: float) -> float:
+    """How much a camera of the cell counts, by its distance.
+
+    Towards a border to another cell the cameras across this cell fade out, so that the picture
+    does not jump where other cameras take over.
+    """
+    across = abs(viewpoint.col - camera[1]) / array.col_step if array.col_step else 0.0
+    down = abs(viewpoint.row - camera[0]) / array.row_step if array.row_step else 0.0
+    weight = 1 / (spread + across**2 + down**2)
+    if camera[1] == cell.left and cell.right < array.cols - 1:
+        weight *= min(1.0, (1 - across) / FADE)
+    if camera[1] == cell.right and cell.left > 0:
+        weight *= min(1.0, (1 - across) / FADE)
+    if camera[0] == cell.top and cell.bottom < array.rows - 1:
+        weight *= min(1.0, (1 - down) / FADE)
+    if camera[0] == cell.bottom and cell.top > 0:
+        weight *= min(1.0, (1 - down) / FADE)
+    return weight
+
+
 class Layered:
     """The `layered` synthesizer. Thread-safe; keeps what it prepared for the last decoded set."""
 
@@ -143,41 +166,22 @@ class Layered:
             pixels = decoded.pictures[position]
             own = decoded.disparities[position].values_px
             return RenderedView(viewpoint, pixels.copy(), own.copy(), np.ones(own.shape, np.uint8))
-        weights = {camera: self._weight(array, cell, camera, viewpoint) for camera in cell.cameras}
+        sources = self._prepared(decoded)
+        weights = {camera: _weight(array, cell, camera, viewpoint, sources.spread) for camera in cell.cameras}
         cameras = [camera for camera in cell.cameras if weights[camera] > 0 and camera in decoded.pictures]
         if not cameras:
             raise SettingError("decoded.pictures", "no camera of the view's cell", "at least one")
         shifts = np.array([array.shift_per_disparity(camera, viewpoint) for camera in cameras], np.float32)
         weight = np.array([weights[camera] for camera in cameras], np.float32)
-        sources = self._prepared(decoded)
         places = sources.indices(cameras, self.settings.tolerance_px, self._pool)
         disparity = self._view_disparity(sources, places, shifts, weight)
         pixels, seen_by = self._colour(sources, places, shifts, weight, disparity)
         return RenderedView(viewpoint, pixels, disparity, seen_by)
 
-    def _weight(self, array: CameraArray, cell: Cell, camera: Position, viewpoint: Viewpoint) -> float:
-        """How much a camera of the cell counts, by its distance.
-
-        Towards a border to another cell the cameras across this cell fade out, so that the picture
-        does not jump where other cameras take over.
-        """
-        across = abs(viewpoint.col - camera[1]) / array.col_step if array.col_step else 0.0
-        down = abs(viewpoint.row - camera[0]) / array.row_step if array.row_step else 0.0
-        weight = 1 / (self.settings.spread + across**2 + down**2)
-        if camera[1] == cell.left and cell.right < array.cols - 1:
-            weight *= min(1.0, (1 - across) / FADE)
-        if camera[1] == cell.right and cell.left > 0:
-            weight *= min(1.0, (1 - across) / FADE)
-        if camera[0] == cell.top and cell.bottom < array.rows - 1:
-            weight *= min(1.0, (1 - down) / FADE)
-        if camera[0] == cell.bottom and cell.top > 0:
-            weight *= min(1.0, (1 - down) / FADE)
-        return weight
-
     def _prepared(self, decoded: DecodedSet) -> _Sources:
         with self._lock:
             if self._sources is None or self._sources.decoded is not decoded:
-                self._sources = _Sources(decoded)
+                self._sources = _Sources(decoded, self.settings.spread)
             return self._sources
 
     def _view_disparity(
