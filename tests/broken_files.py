@@ -21,9 +21,9 @@ from mvcodec.video.annexb import nal_type, nal_units
 Sets = list[list[Packet]]
 
 
-def coded_sets(count: int = 12, gop: int = 4, fps: float = 10.0) -> Sets:
+def coded_sets(count: int = 12, gop: int = 4, fps: float = 10.0, codec: str = "h264") -> Sets:
     """Frame sets of two small cameras."""
-    return encode(replace(ARRAY, fps=fps), count, gop=gop, qp=30)
+    return encode(replace(ARRAY, fps=fps), count, gop=gop, qp=30, codec=codec)
 
 
 def written(sets: Sequence[Sequence[Packet]]) -> bytes:
@@ -111,8 +111,8 @@ def _unit(change: Callable[[bytes], bytes], index: int) -> bytes:
     return written(sets)
 
 
-def _without_set(index: int) -> bytes:
-    sets = coded_sets()
+def _without_set(index: int, codec: str = "h264") -> bytes:
+    sets = coded_sets(codec=codec)
     del sets[index]
     return written(sets)
 
@@ -201,6 +201,10 @@ BROKEN_CONTAINERS: Broken = {
 BROKEN_STREAMS: Broken = {
     "missing_set": (lambda: _without_set(5), "missing-reference"),
     "missing_keyframe": (lambda: _without_set(4), "missing-reference"),
+    "missing_set_hevc": (lambda: _without_set(5, "hevc"), "missing-reference"),
+    "missing_keyframe_hevc": (lambda: _without_set(4, "hevc"), "missing-reference"),
+    "missing_set_av1": (lambda: _without_set(5, "av1"), "missing-reference"),
+    "missing_keyframe_av1": (lambda: _without_set(4, "av1"), "missing-reference"),
     "missing_packet": (_without_packet, "incomplete"),
     "out_of_order": (_swapped, "order"),
     "same_time": (_same_time, "order"),

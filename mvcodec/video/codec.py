@@ -194,7 +194,7 @@ class Codec:
         settings: the codec's own settings for a kind of track, for the record in the header.
         options: all options that its encoder is given, by name.
         max_qp: the coarsest of its quantisers; the finest is 1.
-        watch: (width, height) -> what looks for damage that the decoder does not report; None if it does.
+        watch: (width, height) -> what looks for damage that the decoder does not report.
     """
 
     encoder: Callable[[VideoSettings], VideoEncoder]
@@ -202,4 +202,4 @@ class Codec:
     settings: Callable[[TrackKind], str]
     options: Callable[[VideoSettings], dict[str, str]]
     max_qp: int
-    watch: Callable[[tuple[int, int]], Watch] | None = None
+    watch: Callable[[tuple[int, int]], Watch]

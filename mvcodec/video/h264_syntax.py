@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mvcodec.errors import MissingReference, StreamError
 from mvcodec.video.annexb import IDR_SLICE, PPS, SLICE, SPS, nal_type, nal_units
 from mvcodec.video.bits import BitReader, NalError, payload
 
@@ -158,43 +157,6 @@ class H264Parser:
         """MaxFrameNum for a slice: its frame_num counts modulo this; None where it is not known."""
         sequence = self._sequences.get(self._pictures.get(piece.picture_set, -1))
         return None if sequence is None else 1 << sequence.frame_num_bits
-
-
-class ReferenceChain:
-    """Looks at a track's access units before a decoder does, which conceals missing pictures.
-
-    Args:
-        size: (width, height) that the track must have; the decoder would take memory for any.
-    """
-
-    def __init__(self, size: tuple[int, int]) -> None:
-        self._size = size
-        self._parser = H264Parser()
-        self._next: int | None = None
-
-    def push(self, data: bytes, label: str) -> None:
-        """Follow one access unit.
-
-        Raises:
-            MissingReference: what it builds on was not pushed (7.4.3).
-            StreamError: it cannot be parsed, or is of another size.
-        """
-        try:
-            unit = self._parser.push(data)
-        except NalError as error:
-            raise StreamError(label, f"a damaged picture ({error})", "an H.264 access unit") from None
-        for found in unit.sequence_sets:
-            if (found.width, found.height) != self._size:
-                expected = f"{self._size[0]}x{self._size[1]}"
-                raise StreamError(label, f"a picture of {found.width}x{found.height}", expected)
-        for piece in (piece for piece in unit.slices if piece.first_block == 0):
-            top = self._parser.frame_num_range(piece)
-            if top is None or piece.frame_num is None:
-                continue
-            if not piece.idr and piece.frame_num != self._next:
-                what = "a picture that builds on one that is missing"
-                raise MissingReference(label, what, "every picture from a keyframe on")
-            self._next = (piece.frame_num + 1) % top if piece.reference else piece.frame_num
 
 
 def parse_sequence(unit: bytes) -> SequenceParameters:

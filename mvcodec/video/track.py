@@ -20,7 +20,7 @@ class TrackDecoder:
     def __init__(self, codec: Codec, size: tuple[int, int]) -> None:
         self._codec, self._size = codec, size
         self._decoder = codec.decoder()
-        self._watch = None if codec.watch is None else codec.watch(size)
+        self._watch = codec.watch(size)
         self.lost = False
 
     def push(self, data: bytes, keyframe: bool, label: str) -> Planes:
@@ -46,8 +46,7 @@ class TrackDecoder:
             raise
 
     def _decode(self, data: bytes, label: str) -> Planes:
-        if self._watch is not None:
-            self._watch.push(data, label)
+        self._watch.push(data, label)
         found = self._decoder.push(data, label)
         if len(found) != 1:
             raise StreamError(label, f"{len(found)} pictures in an access unit", "one")

@@ -6,9 +6,12 @@ from collections.abc import Callable, Iterator
 from typing import Protocol
 
 from mvcodec.stream import TrackKind
+from mvcodec.video import av1_syntax, hevc_syntax
 from mvcodec.video.annexb import nal_units
+from mvcodec.video.av1_syntax import Av1References
 from mvcodec.video.bits import NalError
 from mvcodec.video.h264_syntax import B_SLICE, AccessUnit, H264Parser, SequenceParameters
+from mvcodec.video.hevc_syntax import HevcReferences
 
 Broken = Iterator[tuple[str, str]]
 """(code, message) of each rule that is broken."""
@@ -111,77 +114,60 @@ class H264Rules:
             self._next = (piece.frame_num + 1) % top if piece.reference else piece.frame_num
 
 
-_HEVC_IDR = frozenset({19, 20})
-_HEVC_SETS = frozenset({32, 33, 34})
-_HEVC_LAST_SLICE = 31
-
-
 class HevcRules:
-    """HEVC: one picture a unit, IDR with VPS, SPS and PPS where a keyframe is due."""
+    """HEVC: one picture a unit, IDR with VPS, SPS and PPS where a keyframe is due, references."""
 
     def __init__(self) -> None:
-        self._seen_keyframe = False
+        self._references = HevcReferences()
 
     def push(self, data: bytes, keyframe: bool) -> Broken:
         """See `UnitRules`."""
-        units = [unit for unit in nal_units(data) if len(unit) > 2]
-        kinds = {unit[0] >> 1 & 0x3F for unit in units}
-        pictures = sum(bool(unit[0] >> 1 & 0x3F <= _HEVC_LAST_SLICE and unit[2] & 0x80) for unit in units)
+        units = nal_units(data)
+        kinds = {hevc_syntax.nal_kind(unit) for unit in units}
+        pictures = sum(map(hevc_syntax.begins_picture, units))
         if pictures != 1:
             yield "one-picture", f"{pictures} pictures in one message"
-        idr = bool(kinds & _HEVC_IDR)
+        idr = bool(kinds & hevc_syntax.IDR_KINDS)
         if keyframe != idr:
             yield (
                 "keyframe",
                 "an IDR picture without a header" if idr else "no IDR picture though a header came",
             )
-        if keyframe and not kinds >= _HEVC_SETS:
+        if keyframe and not kinds >= {hevc_syntax.VPS, hevc_syntax.SPS, hevc_syntax.PPS}:
             yield "parameter-sets", "a keyframe without VPS, SPS and PPS"
-        if not self._seen_keyframe and not idr:
-            yield "missing-reference", "a picture before the first keyframe"
-        self._seen_keyframe |= idr
-
-
-_AV1_SEQUENCE, _AV1_FRAME_HEADER, _AV1_FRAME = 1, 3, 6
+        try:
+            missing = self._references.push(data)
+        except NalError as error:
+            yield "nal", f"a damaged NAL unit ({error})"
+            return
+        if missing is not None:
+            yield "missing-reference", missing
 
 
 class Av1Rules:
-    """AV1: one frame a unit, a sequence header where a keyframe is due, OBUs that are whole."""
+    """AV1: one frame a unit, a key frame with a sequence header where one is due, order of frames."""
+
+    def __init__(self) -> None:
+        self._references = Av1References()
 
     def push(self, data: bytes, keyframe: bool) -> Broken:
         """See `UnitRules`."""
         try:
-            kinds = list(_obu_kinds(data))
+            kinds = [kind for kind, _ in av1_syntax.obus(data)]
+            missing = self._references.push(data)
         except NalError as error:
             yield "obu", f"a damaged OBU ({error})"
             return
-        if not {_AV1_FRAME, _AV1_FRAME_HEADER} & set(kinds):
-            yield "one-picture", "no frame in a message"
-        if keyframe and _AV1_SEQUENCE not in kinds:
+        frames = sum(kind in (av1_syntax.FRAME, av1_syntax.FRAME_HEADER) for kind in kinds)
+        if frames != 1:
+            yield "one-picture", f"{frames} frames in one message"
+        if keyframe and av1_syntax.SEQUENCE_HEADER not in kinds:
             yield "parameter-sets", "a keyframe without sequence header"
-
-
-def _obu_kinds(data: bytes) -> Iterator[int]:
-    """obu_type of each open bitstream unit (AV1 specification, 5.3)."""
-    at = 0
-    while at < len(data):
-        head = data[at]
-        if head & 0x80 or not head & 2:
-            raise NalError("its forbidden bit is set, or it has no size")
-        at += 2 if head & 4 else 1
-        size, shift = 0, 0
-        while True:
-            if at >= len(data) or shift > 28:
-                raise NalError("it ends too early")
-            size |= (data[at] & 0x7F) << shift
-            shift += 7
-            at += 1
-            if not data[at - 1] & 0x80:
-                break
-        at += size
-        if at > len(data):
-            raise NalError("it ends too early")
-        yield head >> 3 & 0xF
+        elif keyframe != self._references.key_frame:
+            found = "no key frame though a header came" if keyframe else "a key frame without a header"
+            yield "keyframe", found
+        if missing is not None:
+            yield "missing-reference", missing
 
 
 UNIT_RULES: dict[str, Callable[[TrackKind, tuple[int, int]], UnitRules]] = {
