@@ -11,6 +11,45 @@ Pictures = NDArray[np.uint8]
 
 
 @njit(cache=True, nogil=True)
+def _between(upper, lower, up, line):  # type: ignore[no-untyped-def]
+    """One row bilinearly, from column -1 on, out of the samples above and below it from column -1 on."""
+    near, far = np.float32(0.75), np.float32(0.25)
+    for k in range(upper.size - 1):  # vectorised
+        above = near * upper[k] + (1 - near) * upper[k + 1]
+        below = near * lower[k] + (1 - near) * lower[k + 1]
+        line[2 * k] = up * above + (1 - up) * below
+        above = far * upper[k] + (1 - far) * upper[k + 1]
+        below = far * lower[k] + (1 - far) * lower[k + 1]
+        line[2 * k + 1] = up * above + (1 - up) * below
+
+
+@njit(cache=True, nogil=True)
+def _at_edge(small, picture, small_picture, y, x, dy, dx, agree, per_step, costs, values):  # type: ignore[no-untyped-def]
+    """The disparity of one pixel by its colour; dy, dx: from it to sample (0, 0), in samples."""
+    rows, columns = small.shape
+    best = np.float32(np.inf)
+    chosen = np.float32(0)
+    count = 0
+    for j in range(max(y // 2 - 1, 0), min(y // 2 + 2, rows)):
+        for i in range(max(x // 2 - 1, 0), min(x // 2 + 2, columns)):
+            difference = np.int32(0)
+            for channel in range(3):
+                difference += abs(np.int32(picture[y, x, channel]) - np.int32(small_picture[j, i, channel]))
+            cost = difference * per_step + (j + dy) * (j + dy) + (i + dx) * (i + dx)
+            costs[count], values[count] = cost, small[j, i]
+            count += 1
+            if cost < best:
+                best, chosen = cost, small[j, i]
+    total, weights = np.float32(0), np.float32(0)
+    for k in range(count):
+        if abs(values[k] - chosen) <= agree:
+            weight = 1 / ((1 + costs[k]) * (1 + costs[k]))
+            total += weight * values[k]
+            weights += weight
+    return total / weights
+
+
+@njit(cache=True, nogil=True)
 def enlarge(
     small: FloatMap, picture: Pictures, small_picture: Pictures, tolerance: float, step: float, out: FloatMap
 ) -> None:
@@ -31,46 +70,28 @@ def enlarge(
     """
     height, width = out.shape
     rows, columns = small.shape
-    near, far = np.float32(0.75), np.float32(0.25)
-    costs = np.empty(9, np.float32)
-    values = np.empty(9, np.float32)
+    costs, values = np.empty(9, np.float32), np.empty(9, np.float32)
     agree, per_step = np.float32(tolerance), np.float32(1 / step)
+    upper, lower = np.empty(columns + 2, np.float32), np.empty(columns + 2, np.float32)
+    line, uneven = np.empty(2 * columns + 2, np.float32), np.empty(columns + 1, np.bool_)
     for v in range(-1, rows):
-        top, bottom = max(v, 0), min(v + 1, rows - 1)
-        for u in range(-1, columns):
-            left, right = max(u, 0), min(u + 1, columns - 1)
-            a, b, c, d = small[top, left], small[top, right], small[bottom, left], small[bottom, right]
-            even = max(max(a, b), max(c, d)) - min(min(a, b), min(c, d)) <= agree
-            for y in range(max(2 * v + 1, 0), min(2 * v + 3, height)):
-                up = near if y == 2 * v + 1 else far
-                for x in range(max(2 * u + 1, 0), min(2 * u + 3, width)):
-                    leftward = near if x == 2 * u + 1 else far
-                    if even:
-                        above = leftward * a + (1 - leftward) * b
-                        below = leftward * c + (1 - leftward) * d
-                        out[y, x] = up * above + (1 - up) * below
-                        continue
-                    best = np.float32(np.inf)
-                    chosen = a
-                    count = 0
-                    for j in range(max(y // 2 - 1, 0), min(y // 2 + 2, rows)):
-                        dy = np.float32(j - v) - (1 - up)
-                        for i in range(max(x // 2 - 1, 0), min(x // 2 + 2, columns)):
-                            dx = np.float32(i - u) - (1 - leftward)
-                            difference = np.int32(0)
-                            for channel in range(3):
-                                difference += abs(
-                                    np.int32(picture[y, x, channel]) - np.int32(small_picture[j, i, channel])
-                                )
-                            cost = difference * per_step + dy * dy + dx * dx
-                            costs[count], values[count] = cost, small[j, i]
-                            count += 1
-                            if cost < best:
-                                best, chosen = cost, small[j, i]
-                    total, weights = np.float32(0), np.float32(0)
-                    for k in range(count):
-                        if abs(values[k] - chosen) <= agree:
-                            weight = 1 / ((1 + costs[k]) * (1 + costs[k]))
-                            total += weight * values[k]
-                            weights += weight
-                    out[y, x] = total / weights
+        for samples, row in ((upper, small[max(v, 0)]), (lower, small[min(v + 1, rows - 1)])):
+            samples[1:-1] = row
+            samples[0], samples[-1] = row[0], row[-1]
+        for k in range(columns + 1):
+            nearest = max(max(upper[k], upper[k + 1]), max(lower[k], lower[k + 1]))
+            farthest = min(min(upper[k], upper[k + 1]), min(lower[k], lower[k + 1]))
+            uneven[k] = nearest - farthest > agree
+        for y in range(max(2 * v + 1, 0), min(2 * v + 3, height)):
+            _between(upper, lower, np.float32(0.75) if y == 2 * v + 1 else np.float32(0.25), line)
+            out[y] = line[1 : width + 1]
+            for k in range(columns + 1):
+                if uneven[k]:
+                    for x in range(max(2 * k - 1, 0), min(2 * k + 1, width)):
+                        dy, dx = (
+                            np.float32(0.25) - np.float32(0.5) * y,
+                            np.float32(0.25) - np.float32(0.5) * x,
+                        )
+                        out[y, x] = _at_edge(
+                            small, picture, small_picture, y, x, dy, dx, agree, per_step, costs, values
+                        )
