@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import (
-    AttachmentIndex,
     Channel,
     ChunkIndex,
     DataEnd,
@@ -22,9 +20,9 @@ from mcap.records import (
     Metadata,
     MetadataIndex,
     Schema,
-    Statistics,
 )
 
+from mvcodec.container.data_section import SUMMARY_RECORDS, DataSection
 from mvcodec.container.exact_file import ExactFile
 from mvcodec.container.finding import Finding, error
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
@@ -53,14 +51,6 @@ _IN_DATA = {
     Opcode.MESSAGE_INDEX,
     Opcode.METADATA,
 }
-_IN_SUMMARY: dict[int, Any] = {
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-    Opcode.STATISTICS: Statistics,
-    Opcode.CHUNK_INDEX: ChunkIndex,
-    Opcode.METADATA_INDEX: MetadataIndex,
-    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
-}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,19 +61,6 @@ class CheckedMessage:
     schema: str
     encoding: str
     record: Message
-
-
-@dataclass(slots=True)
-class _Seen:
-    """What the data section holds, as the summary must repeat it."""
-
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: list[ChunkIndex] = field(default_factory=list)
-    metadata: list[MetadataIndex] = field(default_factory=list)
-    counts: Counter[int] = field(default_factory=Counter)
-    times: tuple[int, int] | None = None
-    attachments: int = 0
 
 
 class FileCheck:
@@ -102,7 +79,7 @@ class FileCheck:
         self._file, self._limits = ExactFile(file), limits
         self.findings: list[Finding] = []
         self.metadata: dict[str, dict[str, str]] = {}
-        self._seen = _Seen()
+        self._seen = DataSection()
         self._message_indexes: dict[int, MessageIndex] | None = None
         self._time_ns: int | None = None
         self._whole = True
@@ -208,9 +185,7 @@ class FileCheck:
         record = parse_message(content)
         seen, number = self._seen, record.channel_id
         self._time_ns = record.log_time
-        seen.counts[number] += 1
-        first, last = seen.times or (record.log_time, record.log_time)
-        seen.times = min(first, record.log_time), max(last, record.log_time)
+        seen.count(number, record.log_time)
         channel = seen.channels.get(number)
         if channel is None:
             self._tell("channel", f"a message of unknown channel {number}")
@@ -303,7 +278,7 @@ class FileCheck:
             if opcode == Opcode.FOOTER:
                 self._check_footer(body, start, place)
                 break
-            kind = _IN_SUMMARY.get(opcode)
+            kind = SUMMARY_RECORDS.get(opcode)
             if kind is not None:
                 found.setdefault(opcode, []).append(self._parsed(kind, body))
             elif opcode != Opcode.SUMMARY_OFFSET:
@@ -311,7 +286,8 @@ class FileCheck:
         else:
             return
         if self._whole:
-            self._compare(found)
+            for difference in self._seen.differences(found):
+                self._tell("summary", difference)
 
     def _check_footer(self, content: bytes, start: int, place: int) -> None:
         footer = self._parsed(Footer, content)
@@ -330,37 +306,3 @@ class FileCheck:
             self._tell("magic", "the file does not end as MCAP does")
         elif self._file.read(1):
             self._tell("magic", "something behind the end")
-
-    def _compare(self, found: dict[int, list[Any]]) -> None:
-        """The summary with what the data hold."""
-        seen = self._seen
-        expected: dict[int, tuple[str, list[Any]]] = {
-            Opcode.SCHEMA: ("schemas", sorted(seen.schemas.values(), key=lambda record: record.id)),
-            Opcode.CHANNEL: ("channels", sorted(seen.channels.values(), key=lambda record: record.id)),
-            Opcode.CHUNK_INDEX: ("chunk indexes", seen.chunks),
-            Opcode.METADATA_INDEX: ("metadata indexes", seen.metadata),
-            Opcode.STATISTICS: ("statistics", [self._statistics()]),
-        }
-        for opcode, (name, records) in expected.items():
-            there = found.get(opcode, [])
-            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                there = sorted((record for record in there if record), key=lambda record: record.id)
-            if there != records:
-                self._tell("summary", f"the {name} of the summary are not those of the file")
-        if len(found.get(Opcode.ATTACHMENT_INDEX, [])) != seen.attachments:
-            self._tell("summary", "the attachment indexes of the summary are not those of the file")
-
-    def _statistics(self) -> Statistics:
-        seen = self._seen
-        start, end = seen.times or (0, 0)
-        return Statistics(
-            attachment_count=seen.attachments,
-            channel_count=len(seen.channels),
-            channel_message_counts=dict(seen.counts),
-            chunk_count=len(seen.chunks),
-            message_count=seen.counts.total(),
-            message_end_time=end,
-            message_start_time=start,
-            metadata_count=len(seen.metadata),
-            schema_count=len(seen.schemas),
-        )
