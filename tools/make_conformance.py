@@ -1,8 +1,8 @@
 """Write the conformance pairs: tests/conformance/NAME.mcap, and NAME.json with what any decoder must find.
 
-Run it only when the format changes: later versions must read the files of earlier ones.
+Write new ones only, when the writer writes something new: later versions must read the files of earlier ones.
 
-    python tools/make_conformance.py tests/conformance
+    python tools/make_conformance.py tests/conformance NAME ...
 """
 
 from __future__ import annotations
@@ -13,10 +13,13 @@ import json
 import sys
 import zlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from mcap.reader import make_reader
 from skimage import data
 
 from mvcodec.array import Calibration, CameraArray, Position
@@ -69,13 +72,30 @@ def _calibrated() -> CameraArray:
     )
 
 
-CASES: dict[str, tuple[CameraArray, int, int, dict[str, Any]]] = {
-    # name: (array, frame sets, first frame, settings)
-    "square": (_nominal(3, 3, 64, 48, 10.0), 6, 0, {"qp": 30, "gop": 3}),
-    "odd_size": (_nominal(1, 4, 33, 17, 25.0), 3, 0, {"qp": 24}),
-    "one_column": (_nominal(4, 1, 32, 32, 2.0), 4, 7, {"qp": 30, "disparity_qp": 40}),
-    "calibrated": (_calibrated(), 2, 0, {"qp": None, "crf": 30.0}),
-    "half_size_maps": (_nominal(2, 3, 35, 50, 10.0), 3, 0, {"qp": 30, "disparity_scale": 2}),
+@dataclass(frozen=True)
+class Case:
+    """What a file is made of: the array, its frames in the input, and the encoder's settings.
+
+    Attributes:
+        live: written as into a pipe, with a frame set left out and told.
+    """
+
+    array: CameraArray
+    frames: tuple[int, ...]
+    settings: dict[str, Any]
+    live: bool = False
+
+
+CASES: dict[str, Case] = {
+    "square": Case(_nominal(3, 3, 64, 48, 10.0), tuple(range(6)), {"qp": 30, "gop": 3}),
+    "odd_size": Case(_nominal(1, 4, 33, 17, 25.0), (0, 1, 2), {"qp": 24}),
+    "one_column": Case(_nominal(4, 1, 32, 32, 2.0), (7, 8, 9, 10), {"qp": 30, "disparity_qp": 40}),
+    "calibrated": Case(_calibrated(), (0, 1), {"qp": None, "crf": 30.0}),
+    "half_size_maps": Case(_nominal(2, 3, 35, 50, 10.0), (0, 1, 2), {"qp": 30, "disparity_scale": 2}),
+    "depth": Case(_calibrated(), (0, 1), {"qp": 34, "depth": True}),
+    "hevc": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 30, "codec": "hevc", "gop": 2}),
+    "av1": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 40, "codec": "av1", "gop": 2}),
+    "live": Case(_nominal(1, 2, 32, 32, 10.0), (0, 1, 3, 4, 5), {"qp": 34, "gop": 2}, live=True),
 }
 
 
@@ -90,20 +110,30 @@ def _frame_set(array: CameraArray, index: int) -> FrameSet:
 
 def write_case(name: str) -> bytes:
     """The MCAP file of a case."""
-    array, count, first, settings = CASES[name]
-    config = EncoderConfig(matcher=Known(), disparity_range_px=RANGE_PX, **settings)
-    target = io.BytesIO()
-    with Encoder(array, config) as encoder, McapWriter(target) as writer:
-        for index in range(first, first + count):
-            writer.push(encoder.push(_frame_set(array, index)))
+    case = CASES[name]
+    config = EncoderConfig(matcher=Known(), disparity_range_px=RANGE_PX, **case.settings)
+    target = _Pipe() if case.live else io.BytesIO()
+    writer = McapWriter(target, 0) if case.live else McapWriter(target)
+    with Encoder(case.array, config) as encoder, writer:
+        for index in case.frames:
+            writer.push(encoder.push(_frame_set(case.array, index)))
+        if case.live:
+            writer.note({"dropped": str(case.frames[-1] + 1 - len(case.frames))})
     return target.getvalue()
+
+
+class _Pipe(io.BytesIO):
+    """What is read while it is written."""
+
+    def seekable(self) -> bool:
+        return False
 
 
 def describe(content: bytes) -> dict[str, Any]:
     """What a conformant decoder finds: stored header, and CRC-32 of planes (cropped rows, top to bottom).
 
     Pictures are described by the planes that the video decoder puts out, which the codec's standard
-    fixes bit by bit; maps by their code values.
+    fixes bit by bit; maps by their code values; depth, where there is any, by its millimetres.
     """
     with McapReader(io.BytesIO(content)) as reader:
         codec, array = find_codec(reader.header.codec), reader.header.array
@@ -124,17 +154,29 @@ def describe(content: bytes) -> dict[str, Any]:
                 half = (slice((array.height + 1) // 2), slice((array.width + 1) // 2))
                 found = [planes.y[: array.height, : array.width], planes.u[half], planes.v[half]]
             frames[number]["crc32"][packet.track.topic] = [zlib.crc32(p.tobytes()) for p in found]
-        return {"header": header, "frame_sets": frames}
+    depth = _depth(content)
+    return {"header": header, "frame_sets": frames, **({"depth_crc32": depth} if depth else {})}
+
+
+def _depth(content: bytes) -> dict[str, list[int]]:
+    """Topic -> CRC-32 of each depth image, rows without padding, 16 bits little-endian."""
+    found: dict[str, list[int]] = {}
+    for _, channel, message in make_reader(io.BytesIO(content)).iter_messages():
+        if channel.topic.endswith("/depth"):
+            found.setdefault(channel.topic, []).append(zlib.crc32(RawImage.FromString(message.data).data))
+    return found
 
 
 def main() -> int:
-    """Write every pair into the folder named on the command line."""
+    """Write the pairs named on the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("folder", type=Path)
-    folder = parser.parse_args().folder
-    for name in CASES:
+    parser.add_argument("name", nargs="+", choices=CASES)
+    arguments = parser.parse_args()
+    folder = arguments.folder
+    for name in arguments.name:
         content = write_case(name)
         (folder / f"{name}.mcap").write_bytes(content)
         text = json.dumps(describe(content), indent=1)
