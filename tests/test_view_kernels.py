@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap, Mask
-from mvcodec.kernels import view_colour, view_depth, view_holes
+from mvcodec.kernels import view_colour, view_depth, view_fetch, view_holes, view_planes
 from mvcodec.synthesis.layered import LayeredSettings
 
 SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11), (14, 8)]
@@ -25,7 +25,7 @@ Run = Callable[[int, int], None]
 
 def test_the_kernels_share_one_value_for_the_unknown() -> None:
     assert np.float32(twins.UNKNOWN) == view_depth.UNKNOWN
-    assert view_colour.CONTOUR < -1e6
+    assert view_fetch.CONTOUR < -1e6
 
 
 def some_maps(rng: np.random.Generator, count: int, shape: Shape, holes: float = 0.0) -> NDArray[np.float32]:
@@ -166,33 +166,40 @@ def test_fill_background(seed: int, shape: Shape, holes: float) -> None:
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_split_luma(shape: Shape) -> None:
-    border = view_colour.BORDER
+    border = view_fetch.BORDER
     picture = np.random.default_rng(3).integers(0, 256, (*shape, 3), dtype=np.uint8)
     size = shape[0] + 2 * border, shape[1] + 2 * border
     luma, colour = np.full(size, np.nan, np.float32), np.full((*size, 2), np.nan, np.float32)
-    view_colour.split_luma(picture, luma, colour)
+    view_planes.split_luma(picture, luma, colour)
     for found, expected in zip((luma, colour), twins.split_luma(picture, border), strict=True):
         np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
+def fetchable(disparity: FloatMap, tolerance: float) -> FloatMap:
+    """The twin of `mark_contours`."""
+    wide, inner = twins.spread(disparity, 1, 2), twins.spread(disparity, 0, 1)
+    marked = np.where((wide > 2 * tolerance) | (inner > tolerance), view_fetch.CONTOUR, disparity)
+    return np.asarray(np.pad(marked, view_fetch.BORDER, mode="edge"), np.float32)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, shapes, st.sampled_from([0.5, 1.5]))
+def test_mark_contours(seed: int, shape: Shape, tolerance: float) -> None:
+    rng = np.random.default_rng(seed)
+    disparity = smoother(some_maps(rng, 1, shape), rng)[0]
+    found = np.full((shape[0] + 2 * view_fetch.BORDER, shape[1] + 2 * view_fetch.BORDER), np.nan, np.float32)
+    view_planes.mark_contours(disparity, tolerance, found)
+    np.testing.assert_array_equal(found, fetchable(disparity, tolerance))
+
+
 def planes_of(sources: list[twins.Source], tolerance: float) -> Planes:
     """The arrays that `blend` takes."""
-    border = view_colour.BORDER
-    split = [twins.split_luma(source.picture, border) for source in sources]
-    fetchable = [
-        np.where(
-            np.maximum(twins.spread(source.disparity, 1, 2) / 2, twins.spread(source.disparity, 0, 1))
-            > tolerance,
-            view_colour.CONTOUR,
-            source.disparity,
-        )
-        for source in sources
-    ]
+    split = [twins.split_luma(source.picture, view_fetch.BORDER) for source in sources]
     return (
         np.array([luma for luma, _ in split], np.float32),
         np.array([colour for _, colour in split], np.float32),
         np.array([source.disparity for source in sources], np.float32),
-        np.array([np.pad(plane, border, mode="edge") for plane in fetchable], np.float32),
+        np.array([fetchable(source.disparity, tolerance) for source in sources], np.float32),
     )
 
 

@@ -18,27 +18,6 @@ ByteMap = NDArray[np.uint8]
 
 
 @njit(cache=True, nogil=True)
-def split_luma(picture: NDArray[np.uint8], luma: FloatMap, colour: NDArray[np.float32]) -> None:
-    """RGB to luma and colour differences, with a border of repeated edge pixels.
-
-    Args:
-        picture: uint8 (H, W, 3).
-        luma: float32 (H + 2 BORDER, W + 2 BORDER), overwritten with Y = .299 R + .587 G + .114 B.
-        colour: float32 (H + 2 BORDER, W + 2 BORDER, 2), overwritten with R - Y and B - Y.
-    """
-    height, width, _ = picture.shape
-    for y in range(height + 2 * BORDER):
-        v = min(max(y - BORDER, 0), height - 1)
-        for x in range(width + 2 * BORDER):
-            u = min(max(x - BORDER, 0), width - 1)
-            red, green, blue = picture[v, u, 0], picture[v, u, 1], picture[v, u, 2]
-            grey = np.float32(0.299) * red + np.float32(0.587) * green + np.float32(0.114) * blue
-            luma[y, x] = grey
-            colour[y, x, 0] = red - grey
-            colour[y, x, 1] = blue - grey
-
-
-@njit(cache=True, nogil=True)
 def _see(x, y, d, cameras, planes, shifts, weights, tolerance, edge_trust, sharpness):  # type: ignore[no-untyped-def]
     """What the cameras see of the view's point (x, y) at disparity d: sums of weight, Y, R - Y, B - Y."""
     luma, colour, disparities, fetchable = planes
@@ -269,8 +248,8 @@ def blend(
     Args:
         cameras: int64 (N,), which of the R real cameras see the view.
         planes: of every real camera: luma float32 (R, H + 4, W + 4) and colour differences
-            (R, H + 4, W + 4, 2), see `split_luma`; disparity (R, H, W), px; and the same with a border
-            (R, H + 4, W + 4), CONTOUR where the 4 x 4 window of a fetch crosses a depth edge.
+            (R, H + 4, W + 4, 2), disparity (R, H, W), px, and where it can be fetched (R, H + 4, W + 4);
+            see `view_planes`.
         shifts: float32 (N, 2), px (x, y) from the view to the camera for each px of disparity.
         weights: float32 (N,), above 0.
         view_disparity: float32 (H, W), known everywhere.

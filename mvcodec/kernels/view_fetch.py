@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 BORDER = 2
-"""Pixels that `split_luma` repeats around a picture, so that a cubic fetch never leaves it."""
+"""Pixels that `view_planes` repeats around a picture, so that a cubic fetch never leaves it."""
 CONTOUR = np.float32(-1e9)
 """Stands, in a map of fetchable disparity, for a pixel whose cubic fetch would cross a depth edge."""
 

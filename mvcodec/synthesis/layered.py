@@ -79,7 +79,7 @@ class _Sources:
     """
 
     def __init__(self, decoded: DecodedSet, spread: float | None) -> None:
-        from mvcodec.kernels.view_colour import BORDER
+        from mvcodec.kernels.view_fetch import BORDER
 
         height, width, count = decoded.array.height, decoded.array.width, len(decoded.array.real)
         padded = (count, height + 2 * BORDER, width + 2 * BORDER)
@@ -102,17 +102,13 @@ class _Sources:
         return np.array([self.decoded.array.real.index(camera) for camera in cameras])
 
     def _prepare(self, camera: Position, tolerance_px: float) -> None:
-        from mvcodec.kernels.view_colour import BORDER, CONTOUR, split_luma
+        from mvcodec.kernels.view_planes import mark_contours, split_luma
 
         place = self.decoded.array.real.index(camera)
         split_luma(self.decoded.pictures[camera], self.lumas[place], self.colours[place])
         values = self.decoded.disparities[camera].values_px
         self.disparities[place] = values
-        # The four pixels around the point must agree by themselves: one of them alone is asked below.
-        crosses = (_spread(values, 4) > 2 * tolerance_px) | (_spread(values, 2) > tolerance_px)
-        self.fetchable[place] = cv2.copyMakeBorder(
-            np.where(crosses, CONTOUR, values), *(BORDER,) * 4, cv2.BORDER_REPLICATE
-        )
+        mark_contours(values, tolerance_px, self.fetchable[place])
 
     @property
     def planes(self) -> tuple[FloatMap, FloatMap, FloatMap, FloatMap]:
@@ -120,12 +116,13 @@ class _Sources:
         return self.lumas, self.colours, self.disparities, self.fetchable
 
 
-def _spread(disparity: FloatMap, size: int) -> FloatMap:
-    """Largest minus smallest disparity of each window (the middle of an even one is its upper left)."""
-    window, anchor = np.ones((size, size), np.uint8), ((size - 1) // 2,) * 2
-    nearest = cv2.dilate(disparity, window, anchor=anchor, borderType=cv2.BORDER_REPLICATE)
-    farthest = cv2.erode(disparity, window, anchor=anchor, borderType=cv2.BORDER_REPLICATE)
-    return np.asarray(nearest - farthest, np.float32)
+def _contours(disparity: FloatMap, tolerance_px: float) -> NDArray[np.uint8]:
+    """uint8 (H, W), 1 where the 3 x 3 window holds more than one surface."""
+    nearest, farthest = (
+        change(disparity, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
+        for change in (cv2.dilate, cv2.erode)
+    )
+    return (nearest - farthest > tolerance_px).view(np.uint8)
 
 
 def _weight(array: CameraArray, cell: Cell, camera: Position, viewpoint: Viewpoint, spread: float) -> float:
@@ -231,7 +228,7 @@ class Layered:
             shifts,
             weights,
             disparity,
-            (_spread(disparity, 3) > settings.tolerance_px).view(np.uint8),
+            _contours(disparity, settings.tolerance_px),
             settings.tolerance_px,
             settings.edge_trust,
             settings.sharpness,

@@ -1,0 +1,82 @@
+"""A real camera's picture and map made ready for fetching: planes with a border, and marks at contours."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mvcodec.kernels.view_fetch import BORDER, CONTOUR
+
+FloatMap = NDArray[np.float32]
+
+
+@njit(cache=True, nogil=True)
+def split_luma(picture: NDArray[np.uint8], luma: FloatMap, colour: NDArray[np.float32]) -> None:
+    """RGB to luma and colour differences, with a border of repeated edge pixels.
+
+    Args:
+        picture: uint8 (H, W, 3).
+        luma: float32 (H + 2 BORDER, W + 2 BORDER), overwritten with Y = .299 R + .587 G + .114 B.
+        colour: float32 (H + 2 BORDER, W + 2 BORDER, 2), overwritten with R - Y and B - Y.
+    """
+    height, width, _ = picture.shape
+    for y in range(height + 2 * BORDER):
+        v = min(max(y - BORDER, 0), height - 1)
+        for x in range(width + 2 * BORDER):
+            u = min(max(x - BORDER, 0), width - 1)
+            red, green, blue = picture[v, u, 0], picture[v, u, 1], picture[v, u, 2]
+            grey = np.float32(0.299) * red + np.float32(0.587) * green + np.float32(0.114) * blue
+            luma[y, x] = grey
+            colour[y, x, 0] = red - grey
+            colour[y, x, 1] = blue - grey
+
+
+@njit(cache=True, nogil=True)
+def _repeat_edges(plane):  # type: ignore[no-untyped-def]
+    """Fill the border of a plane, BORDER wide, with the pixels beside it."""
+    for y in range(BORDER, plane.shape[0] - BORDER):
+        for x in range(BORDER):
+            plane[y, x] = plane[y, BORDER]
+            plane[y, plane.shape[1] - 1 - x] = plane[y, plane.shape[1] - 1 - BORDER]
+    for y in range(BORDER):
+        plane[y] = plane[BORDER]
+        plane[plane.shape[0] - 1 - y] = plane[plane.shape[0] - 1 - BORDER]
+
+
+@njit(cache=True, nogil=True)
+def mark_contours(disparity: FloatMap, tolerance: float, fetchable: FloatMap) -> None:
+    """A map with a border of repeated edge pixels, and CONTOUR where a fetch would cross a depth edge.
+
+    That is where the 4 x 4 pixels around the point differ by more than twice the tolerance, or the inner
+    2 x 2 by more than once: these must agree by themselves, since one of them alone is asked.
+
+    Args:
+        disparity: float32 (H, W), px.
+        tolerance: px.
+        fetchable: float32 (H + 2 BORDER, W + 2 BORDER), overwritten.
+    """
+    height, width = disparity.shape
+    high, low = np.empty(width + 3, np.float32), np.empty(width + 3, np.float32)
+    high_two, low_two = np.empty(width + 1, np.float32), np.empty(width + 1, np.float32)
+    near, twice = np.float32(tolerance), np.float32(2 * tolerance)
+    for y in range(height):
+        above, here = disparity[max(y - 1, 0)], disparity[y]
+        below, last = disparity[min(y + 1, height - 1)], disparity[min(y + 2, height - 1)]
+        for x in range(width):
+            high_two[x], low_two[x] = max(here[x], below[x]), min(here[x], below[x])
+        for x in range(width):
+            high[x + 1] = max(high_two[x], max(above[x], last[x]))
+            low[x + 1] = min(low_two[x], min(above[x], last[x]))
+        for ends in (high, low):
+            ends[0] = ends[1]
+            ends[-2:] = ends[-3]
+        high_two[-1], low_two[-1] = high_two[-2], low_two[-2]
+        out = fetchable[y + BORDER, BORDER:-BORDER]
+        for x in range(width):
+            four = max(max(high[x], high[x + 1]), max(high[x + 2], high[x + 3])) - min(
+                min(low[x], low[x + 1]), min(low[x + 2], low[x + 3])
+            )
+            two = max(high_two[x], high_two[x + 1]) - min(low_two[x], low_two[x + 1])
+            out[x] = CONTOUR if (four > twice) | (two > near) else here[x]
+    _repeat_edges(fetchable)
