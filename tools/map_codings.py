@@ -17,9 +17,8 @@ import numpy as np
 
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture import open_input, resolve_frames
-from mvcodec.cli.arguments import add_frames, disparity_range, join_negative_values
-from mvcodec.cli.decode import DEFAULT_SYNTHESIZER
-from mvcodec.cli.encode import find_range
+from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, disparity_range, join_negative_values
+from mvcodec.cli.coding_options import find_range
 from mvcodec.decoder import Decoder
 from mvcodec.encoder import Encoder, EncoderConfig, find_matcher
 from mvcodec.errors import MvCodecError

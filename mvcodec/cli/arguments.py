@@ -10,6 +10,8 @@ from collections.abc import Sequence
 NEGATIVE_VALUES = ("--disparity-range", "--frames", "--refocus", "--view")
 """Options whose value may begin with a minus sign."""
 
+DEFAULT_SYNTHESIZER = "layered"
+
 
 def join_negative_values(argv: Sequence[str]) -> list[str]:
     """Turn ``--frames -2:`` into ``--frames=-2:``, which argparse would take for an option."""
@@ -82,25 +84,15 @@ def disparity_qp(text: str) -> int | None:
     return int(text)
 
 
-def add_disparity(parser: argparse.ArgumentParser) -> None:
-    """``--disparity-qp``, ``--disparity-scale`` and ``--disparity-median``."""
+def add_synthesizer(parser: argparse.ArgumentParser) -> None:
+    """``--synthesizer NAME``."""
+    from mvcodec.synthesis.table import SYNTHESIZERS
+
     parser.add_argument(
-        "--disparity-qp",
-        type=disparity_qp,
-        metavar="N|auto",
-        help="QP of the disparity maps (default: auto, chosen for the pictures' QP)",
-    )
-    parser.add_argument(
-        "--disparity-scale",
-        type=int,
-        metavar="1|2",
-        help="2: maps at half the pictures' size each way (default: chosen for the pictures' QP)",
-    )
-    parser.add_argument(
-        "--disparity-median",
-        type=int,
-        metavar="N",
-        help="smooth maps over N x N before coding, N odd; 0: don't (default: 5, at half size 3)",
+        "--synthesizer",
+        default=DEFAULT_SYNTHESIZER,
+        metavar="NAME",
+        help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
     )
 
 

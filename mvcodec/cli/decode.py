@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import BinaryIO, cast
 
 from mvcodec.array import Viewpoint
-from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes, view
+from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, pair_of_sizes, view
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error
@@ -30,9 +30,8 @@ from mvcodec.output.mcap_views import McapViews
 from mvcodec.output.provenance import ProvenanceWriter
 from mvcodec.stream import StreamHeader
 from mvcodec.synthesis.synthesizer import Synthesizer
-from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
+from mvcodec.synthesis.table import make_synthesizer
 
-DEFAULT_SYNTHESIZER = "layered"
 MOSAIC = "mosaic"
 MOSAIC_SUFFIXES = (".mp4", ".png")
 MCAP = "mcap"
@@ -70,12 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ROW,COL",
         help="one view, in steps of the input's grid; repeatable",
     )
-    parser.add_argument(
-        "--synthesizer",
-        default=DEFAULT_SYNTHESIZER,
-        metavar="NAME",
-        help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
-    )
+    add_synthesizer(parser)
     parser.add_argument(
         "--provenance",
         action="store_true",

@@ -12,13 +12,8 @@ from pathlib import Path
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.capture.manifest import read_calibration
-from mvcodec.cli.arguments import (
-    add_disparity,
-    add_frames,
-    add_output_options,
-    disparity_range,
-    pair_of_sizes,
-)
+from mvcodec.cli.arguments import add_frames, add_output_options
+from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.encode_stream import Unfinished, add_stream_arguments, encode_stream, is_stream, open_target
 from mvcodec.cli.info import document, summary
 from mvcodec.cli.interrupt import deferred_interrupt
@@ -30,49 +25,20 @@ from mvcodec.container import read_info
 from mvcodec.depth import require_calibration
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
-from mvcodec.frames import FrameSet
 from mvcodec.output.live_view import LiveView
-from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
-from mvcodec.stereo.table import MATCHERS
-from mvcodec.video.codec import PRESETS
-from mvcodec.video.table import CODECS
 
 SUFFIX = ".mcap"
-
-OPTIONS = {
-    "qp": "--qp",
-    "crf": "--crf",
-    "bitrate_kbps": "--bitrate",
-    "disparity_qp": "--disparity-qp",
-    "disparity_scale": "--disparity-scale",
-    "disparity_median": "--disparity-median",
-    "gop": "--gop",
-    "matcher": "--matcher",
-    "preset": "--preset",
-    "codec": "--codec",
-}
-"""The encoder's settings as the user wrote them."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``encode``."""
     default = EncoderConfig()
-    parser.add_argument(
-        "input",
-        type=Path,
-        nargs="+",
-        metavar="INPUT",
-        help="an array folder, R*C videos in row order with --grid, or a recording with --topics: an .mcap"
+    add_input(
+        parser,
+        "an array folder, R*C videos in row order with --grid, or a recording with --topics: an .mcap"
         " file or - for standard input",
     )
     parser.add_argument("output", type=Path, metavar="OUT.mcap", help="or - for standard output")
-    parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
-    parser.add_argument(
-        "--real",
-        default="corners",
-        metavar="corners|all|every:K|R,R..xC,C..",
-        help="the cameras to code (default: corners, or both ends of a linear array)",
-    )
     rate = parser.add_mutually_exclusive_group()
     rate.add_argument(
         "--qp", type=int, metavar="N", help=f"constant QP, 1..51, av1 1..63 (default: {default.qp})"
@@ -81,35 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     rate.add_argument(
         "--bitrate", type=float, metavar="KBPS", help="kbit/s of the pictures and maps of all cameras"
     )
-    parser.add_argument(
-        "--codec",
-        choices=CODECS,
-        default=default.codec,
-        help="of pictures and maps (default: %(default)s, which viewers are sure to play)",
-    )
-    add_disparity(parser)
-    parser.add_argument(
-        "--gop", type=int, metavar="N", help="frames from keyframe to keyframe, at most one second's"
-    )
-    parser.add_argument(
-        "--matcher",
-        default=default.matcher,
-        metavar="NAME",
-        help=f"one of {', '.join(MATCHERS)} (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--preset",
-        default=default.preset,
-        metavar="NAME",
-        help=f"effort of the video encoder, one of {', '.join(PRESETS)} (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--disparity-range",
-        type=disparity_range,
-        metavar="LO,HI|auto",
-        help="px between neighbouring real cameras; auto: estimated whatever the input states"
-        " (default: estimated within what it states)",
-    )
+    add_coding(parser)
     parser.add_argument(
         "--calibration", type=Path, metavar="FILE", help="JSON with the calibration as in array.json"
     )
@@ -209,37 +147,4 @@ def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
     rates = {"qp": arguments.qp, "crf": arguments.crf, "bitrate_kbps": arguments.bitrate}
     if all(value is None for value in rates.values()):
         rates["qp"] = EncoderConfig().qp
-    try:
-        config = EncoderConfig(
-            **rates,
-            disparity_qp=arguments.disparity_qp,
-            disparity_scale=arguments.disparity_scale,
-            disparity_median=arguments.disparity_median,
-            gop=arguments.gop,
-            matcher=arguments.matcher,
-            preset=arguments.preset,
-            codec=arguments.codec,
-            depth=arguments.depth is not None,
-        )
-        Encoder(array, config).flush()
-    except SettingError as error:
-        raise SettingError(OPTIONS.get(error.setting, error.setting), error.found, error.expected) from None
-    return config
-
-
-def find_range(
-    source: ArraySource, chosen: range, option: tuple[float, float] | str | None
-) -> tuple[float, float]:
-    """The range of disparities, px, that ``--disparity-range`` asks for, estimated where it gives none."""
-    if isinstance(option, tuple):
-        return option
-    hint = None if option == "auto" else source.array.disparity_hint_px
-    return estimate_range(source.array, _samples(source, chosen), hint)
-
-
-def _samples(source: ArraySource, chosen: range) -> list[FrameSet]:
-    count = min(MAX_FRAMES, len(chosen))
-    numbers = {chosen[index * (len(chosen) - 1) // max(count - 1, 1)] for index in range(count)}
-    return [
-        frame_set for number in sorted(numbers) for frame_set in source.frame_sets(slice(number, number + 1))
-    ]
+    return checked_config(array, arguments, **rates, depth=arguments.depth is not None)

@@ -79,8 +79,8 @@ def encode_stream(arguments: argparse.Namespace, make_config: Callable[[CameraAr
         span = arguments.disparity_range
         if isinstance(span, tuple):
             config = replace(config, disparity_range_px=span)
-        if not source.array.calibration.given:
-            text = f"{source.name}: no calibration given; nominal values stand in"
+        if source.calibration_note:
+            text = f"{source.name}: {source.calibration_note}; nominal values stand in"
             warnings.warn(text, MvCodecWarning, stacklevel=2)
         _run(arguments, source, config, islice(source.frame_sets(), first, stop), view)
 

@@ -12,22 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from mvcodec.array import CameraArray
 from mvcodec.capture import open_input, resolve_frames
-from mvcodec.cli.arguments import (
-    add_disparity,
-    add_frames,
-    add_output_options,
-    disparity_range,
-    pair_of_sizes,
-    positive_int,
-)
-from mvcodec.cli.decode import DEFAULT_SYNTHESIZER
-from mvcodec.cli.encode import OPTIONS, find_range
+from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, positive_int
+from mvcodec.cli.coding_options import add_coding, add_input, as_option, checked_config, find_range
 from mvcodec.cli.progress import progress
-from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MissingExtra, MvCodecWarning, OutputError, SettingError
-from mvcodec.stereo.table import MATCHERS
-from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
-from mvcodec.video.codec import PRESETS
+from mvcodec.synthesis.table import make_synthesizer
 from mvcodec.video.table import CODECS
 
 if TYPE_CHECKING:
@@ -42,27 +31,13 @@ POINTS = "points"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``evaluate``."""
-    default = EncoderConfig()
-    parser.add_argument(
-        "input",
-        type=Path,
-        nargs="+",
-        metavar="INPUT",
-        help="an array folder, or R*C videos in row order with --grid",
-    )
+    add_input(parser, "an array folder, or R*C videos in row order with --grid")
     parser.add_argument(
         "--output",
         type=Path,
         required=True,
         metavar="REPORT",
         help="a folder; points that it holds already are not measured again",
-    )
-    parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
-    parser.add_argument(
-        "--real",
-        default="corners",
-        metavar="corners|all|every:K|R,R..xC,C..",
-        help="the cameras that mvcodec codes (default: corners, or both ends of a linear array)",
     )
     parser.add_argument(
         "--qp", type=_whole_numbers, metavar="N,N..", help="of the pictures (default: 22,27,32,37)"
@@ -74,37 +49,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="some of simulcast, pvs (default: both; simulcast without B-frames is always there)",
     )
     parser.add_argument(
-        "--codec", choices=CODECS, default=default.codec, help="of mvcodec's streams (default: %(default)s)"
-    )
-    parser.add_argument(
         "--anchor-codecs",
         type=_names,
         metavar="NAME,..",
         help=f"codecs of the anchors, some of {', '.join(CODECS)} (default: all)",
     )
-    add_disparity(parser)
-    parser.add_argument("--disparity-range", type=disparity_range, metavar="LO,HI|auto", help="as for encode")
-    parser.add_argument(
-        "--gop", type=int, metavar="N", help="frames from keyframe to keyframe, in all curves"
-    )
-    parser.add_argument(
-        "--preset",
-        default=default.preset,
-        metavar="NAME",
-        help=f"effort of all video encoders, one of {', '.join(PRESETS)} (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--matcher",
-        default=default.matcher,
-        metavar="NAME",
-        help=f"one of {', '.join(MATCHERS)} (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--synthesizer",
-        default=DEFAULT_SYNTHESIZER,
-        metavar="NAME",
-        help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
-    )
+    add_coding(parser)
+    add_synthesizer(parser)
     parser.add_argument(
         "--jobs",
         type=positive_int,
@@ -177,18 +128,8 @@ def _study(array: CameraArray, arguments: argparse.Namespace, range_px: tuple[fl
     from mvcodec.evaluation.study import Study, translate_qps
 
     make_synthesizer(arguments.synthesizer)  # a wrong name is told before anything is measured
+    config = checked_config(array, arguments, disparity_range_px=range_px)
     try:
-        config = EncoderConfig(
-            disparity_qp=arguments.disparity_qp,
-            disparity_scale=arguments.disparity_scale,
-            disparity_median=arguments.disparity_median,
-            disparity_range_px=range_px,
-            gop=arguments.gop,
-            matcher=arguments.matcher,
-            preset=arguments.preset,
-            codec=arguments.codec,
-        )
-        Encoder(array, config).flush()
         return Study(
             qps=arguments.qp or translate_qps(DEFAULT_QPS, "h264", arguments.codec),
             config=config,
@@ -198,7 +139,7 @@ def _study(array: CameraArray, arguments: argparse.Namespace, range_px: tuple[fl
             jobs=arguments.jobs,
         )
     except SettingError as error:
-        raise SettingError(OPTIONS.get(error.setting, error.setting), error.found, error.expected) from None
+        raise as_option(error) from None
 
 
 def _whole_numbers(text: str) -> tuple[int, ...]:

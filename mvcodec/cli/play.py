@@ -9,9 +9,9 @@ from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
-from mvcodec.cli.decode import DEFAULT_SYNTHESIZER
+from mvcodec.cli.arguments import add_synthesizer
 from mvcodec.errors import MissingExtra
-from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
+from mvcodec.synthesis.table import make_synthesizer
 
 EXTRA = "play"
 PACKAGES = ("starlette", "uvicorn", "websockets")
@@ -27,12 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=_port, default=0, help="0 takes any free one (default: 0)")
     parser.add_argument("--no-browser", action="store_true", help="print the URL, open no browser")
-    parser.add_argument(
-        "--synthesizer",
-        default=DEFAULT_SYNTHESIZER,
-        metavar="NAME",
-        help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
-    )
+    add_synthesizer(parser)
     parser.add_argument(
         "--on-error",
         choices=("skip", "stop"),

@@ -11,8 +11,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from mvcodec.array import CameraArray, Viewpoint
-from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes, view
-from mvcodec.cli.decode import DEFAULT_SYNTHESIZER
+from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, pair_of_sizes, view
 from mvcodec.cli.progress import progress
 from mvcodec.container import McapReader, read_info
 from mvcodec.decoder import Decoder
@@ -22,7 +21,7 @@ from mvcodec.output.light_field import quilt_path
 from mvcodec.output.picture_file import STILL_SUFFIX, WRITERS, find_writer
 from mvcodec.output.styles import STYLES, ShotSettings, take
 from mvcodec.output.view_path import FILE_SUFFIX, SHAPES, read_waypoints, walk_shape, walk_waypoints
-from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
+from mvcodec.synthesis.table import make_synthesizer
 
 QUILT = "quilt"
 FROZEN_SECONDS = 2
@@ -65,12 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="RxC",
         help="views of a mosaic, quilt or refocused picture; 1xN: of an epipolar slice",
     )
-    parser.add_argument(
-        "--synthesizer",
-        default=DEFAULT_SYNTHESIZER,
-        metavar="NAME",
-        help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
-    )
+    add_synthesizer(parser)
     add_frames(parser, "frames of the file")
     add_output_options(parser)
 

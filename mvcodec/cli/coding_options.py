@@ -1,0 +1,148 @@
+"""Options of the commands that code an array, and the encoder's configuration that they make."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from mvcodec.array import CameraArray
+from mvcodec.capture import ArraySource
+from mvcodec.cli.arguments import disparity_qp, disparity_range, pair_of_sizes
+from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.errors import SettingError
+from mvcodec.frames import FrameSet
+from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
+from mvcodec.stereo.table import MATCHERS
+from mvcodec.video.codec import PRESETS
+from mvcodec.video.table import CODECS
+
+_OPTIONS = {
+    "qp": "--qp",
+    "crf": "--crf",
+    "bitrate_kbps": "--bitrate",
+    "disparity_qp": "--disparity-qp",
+    "disparity_scale": "--disparity-scale",
+    "disparity_median": "--disparity-median",
+    "gop": "--gop",
+    "matcher": "--matcher",
+    "preset": "--preset",
+    "codec": "--codec",
+}
+"""The encoder's settings as the user wrote them."""
+
+
+def as_option(error: SettingError) -> SettingError:
+    """The same error with the encoder's setting under the name of its option."""
+    return SettingError(_OPTIONS.get(error.setting, error.setting), error.found, error.expected)
+
+
+def add_input(parser: argparse.ArgumentParser, what: str) -> None:
+    """``INPUT``, ``--grid`` and ``--real``."""
+    parser.add_argument("input", type=Path, nargs="+", metavar="INPUT", help=what)
+    parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
+    parser.add_argument(
+        "--real",
+        default="corners",
+        metavar="corners|all|every:K|R,R..xC,C..",
+        help="the cameras to code (default: corners, or both ends of a linear array)",
+    )
+
+
+def add_coding(parser: argparse.ArgumentParser) -> None:
+    """How pictures and maps are coded, apart from the rate."""
+    default = EncoderConfig()
+    parser.add_argument(
+        "--codec",
+        choices=CODECS,
+        default=default.codec,
+        help="of pictures and maps (default: %(default)s, which viewers are sure to play)",
+    )
+    _add_disparity(parser)
+    parser.add_argument(
+        "--gop", type=int, metavar="N", help="frames from keyframe to keyframe, at most one second's"
+    )
+    parser.add_argument(
+        "--matcher",
+        default=default.matcher,
+        metavar="NAME",
+        help=f"one of {', '.join(MATCHERS)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--preset",
+        default=default.preset,
+        metavar="NAME",
+        help=f"effort of video encoders, one of {', '.join(PRESETS)} (default: %(default)s)",
+    )
+
+
+def _add_disparity(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--disparity-qp",
+        type=disparity_qp,
+        metavar="N|auto",
+        help="QP of the disparity maps (default: auto, chosen for the pictures' QP)",
+    )
+    parser.add_argument(
+        "--disparity-scale",
+        type=int,
+        metavar="1|2",
+        help="2: maps at half the pictures' size each way (default: chosen for the pictures' QP)",
+    )
+    parser.add_argument(
+        "--disparity-median",
+        type=int,
+        metavar="N",
+        help="smooth maps over N x N before coding, N odd; 0: don't (default: 5, at half size 3)",
+    )
+    parser.add_argument(
+        "--disparity-range",
+        type=disparity_range,
+        metavar="LO,HI|auto",
+        help="px between neighbouring real cameras; auto: estimated whatever the input states"
+        " (default: estimated within what it states)",
+    )
+
+
+def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: Any) -> EncoderConfig:
+    """The settings, checked against the array before the time-consuming part begins.
+
+    Args:
+        others: settings of EncoderConfig that `add_coding` has no option for.
+
+    Raises:
+        SettingError: one does not fit.
+    """
+    try:
+        config = EncoderConfig(
+            disparity_qp=arguments.disparity_qp,
+            disparity_scale=arguments.disparity_scale,
+            disparity_median=arguments.disparity_median,
+            gop=arguments.gop,
+            matcher=arguments.matcher,
+            preset=arguments.preset,
+            codec=arguments.codec,
+            **others,
+        )
+        Encoder(array, config).flush()
+    except SettingError as error:
+        raise as_option(error) from None
+    return config
+
+
+def find_range(
+    source: ArraySource, chosen: range, option: tuple[float, float] | str | None
+) -> tuple[float, float]:
+    """The range of disparities, px, that ``--disparity-range`` asks for, estimated where it gives none."""
+    if isinstance(option, tuple):
+        return option
+    hint = None if option == "auto" else source.array.disparity_hint_px
+    return estimate_range(source.array, _samples(source, chosen), hint)
+
+
+def _samples(source: ArraySource, chosen: range) -> list[FrameSet]:
+    count = min(MAX_FRAMES, len(chosen))
+    numbers = {chosen[index * (len(chosen) - 1) // max(count - 1, 1)] for index in range(count)}
+    return [
+        frame_set for number in sorted(numbers) for frame_set in source.frame_sets(slice(number, number + 1))
+    ]
