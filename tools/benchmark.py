@@ -14,25 +14,22 @@ scene). Without --what, both.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 import time
-import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mvcodec.array import CameraArray, Position, Viewpoint
+from array_sets import add_options, find_sets, match_corners, run, say, scored_views, with_virtual_views
+
+from mvcodec.array import Viewpoint
 from mvcodec.capture import ArraySource, open_input
 from mvcodec.capture.scene import SceneSettings
-from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
+from mvcodec.errors import InputError, SettingError
 from mvcodec.evaluation.quality import QualityMeter
-from mvcodec.frames import DecodedSet, FrameSet
 from mvcodec.output.sample import write_sample
-from mvcodec.stereo.disparity_range import estimate_range
-from mvcodec.stereo.table import MATCHERS, make_matcher
+from mvcodec.stereo.table import MATCHERS
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.table import make_synthesizer
 
@@ -58,29 +55,6 @@ class SetFigures:
         return {name: getattr(self, name) for name in names}
 
 
-def scored_views(array: CameraArray) -> list[Position]:
-    """The virtual views that count; a sample of them in the grids of 17 x 17 and 9 x 9."""
-    virtual = [view for view in array.positions if view not in array.real]
-    if (array.rows, array.cols) == (17, 17):
-        return [(row, col) for row, col in virtual if row % 4 == 0 and col % 4 == 0]
-    if (array.rows, array.cols) == (9, 9):
-        return [(row, col) for row, col in virtual if (row + col) % 5 == 0]
-    return virtual
-
-
-def match_corners(source: ArraySource, matcher: str) -> tuple[FrameSet, DecodedSet, float]:
-    """Frame 0 of real and scored views, its uncoded corners with their maps, and seconds of matching."""
-    array = source.array
-    (originals,) = source.frame_sets(slice(0, 1), [*array.real, *scored_views(array)])
-    pictures = {camera: originals.pictures[camera] for camera in array.real}
-    range_px = estimate_range(array, [originals], None)
-    started = time.perf_counter()
-    maps = make_matcher(matcher).match(array, pictures, range_px)
-    seconds = time.perf_counter() - started
-    decoded = DecodedSet(array, originals.index, originals.time_ns, pictures, maps, range_px)
-    return originals, decoded, seconds
-
-
 def measure_quality(source: ArraySource, matcher: str, synthesizer: Synthesizer) -> SetFigures:
     """Match the uncoded corners of frame 0, render the scored views, compare them."""
     array, views = source.array, scored_views(source.array)
@@ -99,20 +73,6 @@ def measure_quality(source: ArraySource, matcher: str, synthesizer: Synthesizer)
         raise InputError(source.name, "no virtual view", "at least one")
     seconds_per_view, range_px = render_seconds / len(views), decoded.disparity_range_px
     return SetFigures(psnr, ssim, worst, seconds_per_view, matching_seconds, range_px, len(views))
-
-
-def find_sets(data: Path, names: Sequence[str] | None) -> dict[str, Path]:
-    """Array folders by name: `data` itself, or those right below it."""
-    if (data / "array.json").is_file():
-        found = {data.resolve().name: data}
-    else:
-        found = {path.parent.name: path.parent for path in sorted(data.glob("*/array.json"))}
-    if not found:
-        raise InputError(data, "no array.json in it or right below it", "an array folder or a folder of them")
-    unknown = [name for name in names or () if name not in found]
-    if unknown:
-        raise SettingError("--sets", ",".join(unknown), "some of " + ", ".join(found))
-    return {name: found[name] for name in names or found}
 
 
 def quality_table(sets: dict[str, ArraySource], arguments: argparse.Namespace) -> dict[str, Any]:
@@ -161,28 +121,6 @@ def rendered(folder: Path) -> ArraySource:
     return open_input([folder])
 
 
-def say(line: str, arguments: argparse.Namespace) -> None:
-    """Tables go to standard output, or aside where JSON goes there."""
-    print(line, file=sys.stderr if arguments.json else sys.stdout, flush=True)
-
-
-def with_virtual_views(found: dict[str, Path], arguments: argparse.Namespace) -> dict[str, ArraySource]:
-    """Open the sets; leave those out that have nothing to synthesise, and say so."""
-    sets = {}
-    for name, path in found.items():
-        source = open_input([path])
-        if scored_views(source.array):
-            sets[name] = source
-        else:
-            say(
-                f"{name}: skipped, its {source.array.rows} x {source.array.cols} grid has no virtual view",
-                arguments,
-            )
-    if not sets:
-        raise InputError(arguments.data, "no set with a virtual view", "at least one")
-    return sets
-
-
 def measure(arguments: argparse.Namespace) -> dict[str, Any]:
     """What was asked for, in the form of ``--json``."""
     if arguments.data is None:
@@ -204,25 +142,12 @@ def measure(arguments: argparse.Namespace) -> dict[str, Any]:
 def main() -> int:
     """Parse, measure, print."""
     parser = argparse.ArgumentParser(description="Synthesis quality and speed of mvcodec.")
-    parser.add_argument("--data", type=Path, metavar="DIR")
-    parser.add_argument("--sets", type=lambda text: text.split(","), metavar="A,B")
+    add_options(parser, data_required=False)
     parser.add_argument("--what", choices=("quality", "speed"))
-    parser.add_argument("--matcher", default="joint")
     parser.add_argument(
         "--maps", choices=MATCHERS, help="quality from another matcher's maps too, e.g. sgbm-h"
     )
-    parser.add_argument("--synthesizer", default="layered")
-    parser.add_argument("--json", action="store_true")
-    arguments = parser.parse_args()
-    warnings.simplefilter("ignore", MvCodecWarning)  # nominal calibration does not matter here
-    try:
-        document = measure(arguments)
-    except MvCodecError as error:
-        print(f"benchmark: {error}", file=sys.stderr)
-        return 2 if isinstance(error, SettingError) else 1
-    if arguments.json:
-        print(json.dumps(document, indent=2))
-    return 0
+    return run(parser, measure)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
     python tools/error_shares.py --data DIR [--sets A,B] [--matcher NAME] [--synthesizer NAME] [--json]
 
-Sets and views are those of benchmark.py beside this file: uncoded corners in, virtual views of frame 0 out.
+Sets and views are those of benchmark.py: uncoded corners in, virtual views of frame 0 out.
 A pixel belongs to the first of these regions that fits:
 
     filled   no real camera saw it
@@ -18,17 +18,13 @@ view had the mean brightness of its original.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-import warnings
-from pathlib import Path
 from typing import Any
 
-from benchmark import find_sets, match_corners, say, scored_views, with_virtual_views
+from array_sets import add_options, find_sets, match_corners, run, say, scored_views, with_virtual_views
 
 from mvcodec.array import Viewpoint
 from mvcodec.capture import ArraySource
-from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.evaluation.error_regions import REGIONS, ErrorMeter, ErrorShares
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.table import make_synthesizer
@@ -74,21 +70,8 @@ def measure(arguments: argparse.Namespace) -> dict[str, Any]:
 def main() -> int:
     """Parse, measure, print."""
     parser = argparse.ArgumentParser(description="Where the remaining error of synthesised views sits.")
-    parser.add_argument("--data", type=Path, metavar="DIR", required=True)
-    parser.add_argument("--sets", type=lambda text: text.split(","), metavar="A,B")
-    parser.add_argument("--matcher", default="joint")
-    parser.add_argument("--synthesizer", default="layered")
-    parser.add_argument("--json", action="store_true")
-    arguments = parser.parse_args()
-    warnings.simplefilter("ignore", MvCodecWarning)  # nominal calibration does not matter here
-    try:
-        document = measure(arguments)
-    except MvCodecError as error:
-        print(f"error_shares: {error}", file=sys.stderr)
-        return 2 if isinstance(error, SettingError) else 1
-    if arguments.json:
-        print(json.dumps(document, indent=2))
-    return 0
+    add_options(parser, data_required=True)
+    return run(parser, measure)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
+from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap_protobuf.schema import build_file_descriptor_set
 
 from mvcodec.array import CameraArray, Position, Viewpoint
@@ -106,6 +107,18 @@ def place_messages(
         RigMessage(topic, "calibration", _calibration(array, frame)),
         RigMessage(TRANSFORM_TOPIC, "transform", _transform(array, place, frame)),
     )
+
+
+def channels(
+    rig: Sequence[RigMessage], video_topics: Sequence[str]
+) -> list[tuple[str, str, str, str, bytes]]:
+    """What `ChunkedFile.add_channel` takes, for each topic of a rig and its videos, once."""
+    kinds = {message.topic: message.kind for message in rig} | dict.fromkeys(video_topics, "video")
+    return [
+        (topic, MessageEncoding.Protobuf, name, SchemaEncoding.Protobuf, schema)
+        for topic, kind in kinds.items()
+        for name, schema in [PROTOBUF_SCHEMAS[kind]]
+    ]
 
 
 def video_message(packet: Packet, codec: str) -> bytes:

@@ -7,8 +7,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Self
 
-from mcap.well_known import MessageEncoding, SchemaEncoding
-
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.container import schemas
 from mvcodec.container.chunked_file import CHUNK_MS, ChunkedFile
@@ -75,11 +73,8 @@ class VideoTopicsWriter:
 
     def _start(self) -> None:
         self._file.open()
-        kinds = {message.topic: message.kind for message in self._rig}
-        kinds.update({topic: "video" for topic, _ in self._topics})
-        for topic, kind in kinds.items():
-            name, schema = schemas.PROTOBUF_SCHEMAS[kind]
-            self._file.add_channel(topic, MessageEncoding.Protobuf, name, SchemaEncoding.Protobuf, schema)
+        for channel in schemas.channels(self._rig, [topic for topic, _ in self._topics]):
+            self._file.add_channel(*channel)
 
 
 def _frame(name: str) -> str:

@@ -110,11 +110,8 @@ class McapWriter:
         self._video_topics = tuple(track.topic for track in header.tracks)
         json_schema = (schemas.HEADER_SCHEMA_NAME, SchemaEncoding.JSONSchema, schemas.HEADER_SCHEMA)
         self._file.add_channel(HEADER_TRACK.topic, MessageEncoding.JSON, *json_schema)
-        kinds = {message.topic: message.kind for message in self._rig}
-        kinds.update(dict.fromkeys(self._video_topics, "video"))
-        for topic, kind in kinds.items():
-            name, schema = schemas.PROTOBUF_SCHEMAS[kind]
-            self._file.add_channel(topic, MessageEncoding.Protobuf, name, SchemaEncoding.Protobuf, schema)
+        for channel in schemas.channels(self._rig, self._video_topics):
+            self._file.add_channel(*channel)
 
     def _topics(self) -> str:
         """Which topic each channel is, for readers that lack the first chunk, where channels are declared."""
