@@ -12,6 +12,7 @@ from typing import BinaryIO
 
 from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.capture.picture_messages import PictureDecoder
+from mvcodec.capture.recorded_calibration import NotRectified, array_calibration
 from mvcodec.capture.selection import select_real
 from mvcodec.container.chunks import OnDamage
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
@@ -89,7 +90,8 @@ class Recording:
         on_damage: told of damage, behind which reading goes on; None raises it.
 
     Attributes:
-        array: geometry, known from the first frame set.
+        array: geometry, known from the first frame set and what was recorded of the cameras up to then.
+        calibration_note: why the calibration is nominal; empty where it is not.
 
     Raises:
         InputError: no frame set, or pictures that are damaged or of different sizes.
@@ -121,8 +123,11 @@ class Recording:
         self._last_ns: int | None = None
         self._dropped = 0
         self._sets = self._matched()
+        self._frames: dict[Position, str] = {}
+        self.calibration_note = ""
         self._first = self._read_first()
         self.array = self._make_array(self._first[0])
+        self._reader.rig = None
 
     @property
     def dropped(self) -> int:
@@ -178,6 +183,7 @@ class Recording:
     def _make_array(self, first: tuple[int, dict[Position, Picture]]) -> CameraArray:
         rows, cols = self._settings.grid
         height, width = next(iter(first[1].values())).shape[:2]
+        calibration, rho = self._calibration(width, height)
         return CameraArray(
             rows=rows,
             cols=cols,
@@ -186,9 +192,26 @@ class Recording:
             fps=self._fps or 1.0,
             real_rows=self._axes[0],
             real_cols=self._axes[1],
-            calibration=self._settings.calibration or Calibration.nominal(width, height),
+            calibration=calibration,
+            rho=rho,
             name=self.name,
         )
+
+    def _calibration(self, width: int, height: int) -> tuple[Calibration, float]:
+        """The calibration that was asked for, the recording's own, or the nominal one; and rho."""
+        if self._settings.calibration is not None:
+            return self._settings.calibration, 1.0
+        self.calibration_note = "no calibration given"
+        try:
+            assert self._reader.rig is not None
+            found = array_calibration(self._reader.rig, self._frames, (width, height))
+        except NotRectified as reason:
+            self.calibration_note = f"its calibration is not that of a rectified array ({reason})"
+            found = None
+        if found is None:
+            return Calibration.nominal(width, height), 1.0
+        self.calibration_note = ""
+        return found
 
     def _matched(self) -> Iterator[tuple[int, dict[Position, Picture]]]:
         """(time of the first camera, pictures) of every frame set that is whole."""
@@ -199,6 +222,7 @@ class Recording:
                 self._drop(camera, message, "its time is not after the one before")
                 continue
             latest_ns[camera] = message.time_ns
+            self._frames.setdefault(camera, message.frame_id)
             queue = self._queues[camera]
             queue.append(message)
             if len(queue) > MAX_WAITING or (len(queue) > 1 and self._waiting_bytes() > MAX_WAITING_BYTES):

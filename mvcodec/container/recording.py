@@ -12,8 +12,9 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
 from mcap.records import Message
 
-from mvcodec.container.chunks import ChunkReader, OnDamage
+from mvcodec.container.chunks import ChunkReader, OnDamage, TopicMessage
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.container.recorded_rig import RecordedRig
 from mvcodec.errors import StreamError
 
 SCHEMAS: dict[str, Any] = {
@@ -61,6 +62,9 @@ class RecordingReader:
         limits: what is more than that is refused.
         on_damage: told of damage, behind which reading goes on; None raises it.
 
+    Attributes:
+        rig: what was read about cameras, up to the end of the chunk at hand; None: it is not wanted.
+
     Raises (also while iterating):
         StreamError: not MCAP, damaged, or a topic holds something other than pictures.
     """
@@ -76,6 +80,7 @@ class RecordingReader:
         self.name = name
         self._chunks = ChunkReader(file, name, limits, on_damage)
         self._topics = frozenset(topics)
+        self.rig: RecordedRig | None = RecordedRig()
         if self._chunks.indexed:
             self._check_topics(self._chunks.topics)
 
@@ -96,10 +101,17 @@ class RecordingReader:
     def pictures(self) -> Iterator[RecordedPicture]:
         """Every picture on the topics, in the order of the file."""
         for chunk in self._chunks.chunks():
+            self._collect_rig(chunk)
             for topic, message in chunk:
                 if topic in self._topics:
                     yield self._picture(topic, message)
         self._check_topics(self._chunks.topics)
+
+    def _collect_rig(self, chunk: list[TopicMessage]) -> None:
+        if self.rig is not None:
+            for topic, message in chunk:
+                if topic not in self._topics:
+                    self.rig.push(self._chunks.schema_of(topic)[0], message.data)
 
     def _check_topics(self, there: set[str]) -> None:
         missing = sorted(self._topics - there)
