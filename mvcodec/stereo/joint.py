@@ -3,7 +3,8 @@
 One disparity explains a camera's horizontal and its vertical partner (ALGORITHMS section 0), so that
 their costs are added before any decision is taken. Semi-global matching decides; what no other camera's
 map confirms is decided again from its surroundings alone, except that a place which another camera
-sees through is ruled out.
+sees through is ruled out. What no partner can see, beyond the borders of their pictures, takes the
+disparity of the confirmed surface that it is connected with best.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ class JointSettings:
         contrast: grey levels that halve P2, above 0.
         hold_per_px, hold_limit: how firmly confirmed pixels hold when the rest is completed.
         through_cost: of a disparity that another camera sees through, 0..254.
+        edge_cost: px of detour that a grey level of contrast is worth where no partner can see, at least 0.
         tolerance_px: maps agree within this, px, above 0.
         border_speckle_px: smallest patch that counts where no partner sees the whole range, pixels.
         median_size: window of the median after completion, 0 (none), 3 or 5.
@@ -65,6 +67,7 @@ class JointSettings:
     hold_per_px: float = 7
     hold_limit: float = 40
     through_cost: float = 40
+    edge_cost: float = 3
     tolerance_px: float = 1.0
     border_speckle_px: int = 50
     median_size: int = 5
@@ -144,9 +147,15 @@ class Joint:
             for _ in range(self.settings.subpixel_steps):
                 refined = pool.map(partial(_refined, array, views, maps, valid), array.real)
                 maps = dict(zip(array.real, refined, strict=True))
+            extended = pool.map(
+                lambda camera: self._beyond_partners(
+                    array, camera, views[camera], valid[camera], np.clip(maps[camera], *range_px)
+                ),
+                array.real,
+            )
             return {
-                camera: DisparityMap(np.clip(values, *range_px), valid[camera])
-                for camera, values in maps.items()
+                camera: DisparityMap(values, valid[camera])
+                for camera, values in zip(array.real, extended, strict=True)
             }
 
     def _decide(
@@ -250,6 +259,16 @@ class Joint:
         holds = valid[camera] & (np.abs(completed - raw[camera]) <= 1.5)
         return np.where(holds, raw[camera], completed)
 
+    def _beyond_partners(
+        self, array: CameraArray, camera: Position, view: _View, valid: Mask, disparity: FloatMap
+    ) -> FloatMap:
+        """Replace what no partner can see: scanlines alone leave streaks there."""
+        from mvcodec.kernels import geodesic
+
+        carried = disparity.copy()
+        geodesic.carry(view.planes, valid, self.settings.edge_cost, carried)
+        return np.where(_outside(array, camera, carried) & ~valid, carried, disparity)
+
 
 def _refined(
     array: CameraArray,
@@ -305,10 +324,14 @@ def _steps(array: CameraArray, camera: Position, others: list[Position]) -> NDAr
 
 def _unseen_border(array: CameraArray, camera: Position, range_px: tuple[float, float]) -> Mask:
     """bool (H, W): where the nearest disparity leaves every partner's picture."""
+    return _outside(array, camera, np.full((array.height, array.width), range_px[1], np.float32))
+
+
+def _outside(array: CameraArray, camera: Position, disparity: FloatMap) -> Mask:
+    """bool (H, W): where a pixel of this disparity leaves every partner's picture."""
     unseen = np.ones((array.height, array.width), np.bool_)
+    x, y = np.arange(array.width)[None], np.arange(array.height)[:, None]
     for by_x, by_y in _steps(array, camera, _partners(array, camera)):
-        x = np.arange(array.width) - by_x * range_px[1]
-        y = np.arange(array.height) - by_y * range_px[1]
-        inside_x, inside_y = (x >= 0) & (x < array.width), (y >= 0) & (y < array.height)
-        unseen &= ~(inside_x[None] & inside_y[:, None])
+        there_x, there_y = x - by_x * disparity, y - by_y * disparity
+        unseen &= (there_x < 0) | (there_x >= array.width) | (there_y < 0) | (there_y >= array.height)
     return unseen
