@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import subprocess
 import threading
 import time
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import IO, BinaryIO, cast
 
 import numpy as np
 import pytest
-from coding import config, frame_set, luma_psnr, make_array
+from coding import Pipe, config, frame_set, luma_psnr, make_array
 from command_line import COMMAND, fails, mvcodec, succeeds
 from recordings import ARRAY, GRID, START_NS, recording, shots
 from small_arrays import write_array
 
 from mvcodec.capture.recording import Recording, RecordingSettings
-from mvcodec.container import McapReader, McapWriter
+from mvcodec.container import McapReader, McapWriter, read_info
+from mvcodec.container.chunks import DROPPED_KEY
 from mvcodec.decoder import Decoder
 from mvcodec.encoder import Encoder
 from mvcodec.errors import OutputError, SettingError
@@ -194,7 +196,7 @@ def _live(count: int, when_behind: str, seconds: float) -> tuple[LiveEncoding, b
     ):
         live = LiveEncoding(encoder, writer, when_behind)  # type: ignore[arg-type]
         live.run(frame_set(array, index) for index in range(count))
-        writer.note({"dropped": str(live.dropped)})
+        writer.note({DROPPED_KEY: str(live.dropped)})
         target.seconds = 0
     return live, bytes(target.content)
 
@@ -206,7 +208,46 @@ def test_a_slow_reader_costs_frame_sets_that_are_counted() -> None:
     assert len(found) + live.dropped == 60
     assert found == sorted(set(found))
     assert len(found) <= 60 - live.dropped <= 60
-    assert b'"dropped"' in content or b"dropped" in content, "the count is in the file"
+    assert read_info(io.BytesIO(content)).dropped == live.dropped, "the count is in the file"
+    assert read_info(cast("BinaryIO", Pipe(content))).dropped == live.dropped
+
+
+@pytest.mark.parametrize("policy", ["drop", "block"])
+def test_a_reader_that_waits_costs_the_command_frame_sets_only_if_they_may_be_dropped(
+    policy: str, tmp_path: Path
+) -> None:
+    count = 90
+    content = recording("rgb8", shots(count))
+    options = ("--topics", "/cam00,/cam01", "--qp", "1", "--fps", "10", "--when-behind", policy)
+    process = subprocess.Popen(
+        [*COMMAND, "encode", "-", "-", *FAST, *options],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert process.stdin is not None
+
+    def feed(stdin: IO[bytes]) -> None:
+        with stdin:
+            stdin.write(content)
+
+    feeder = threading.Thread(target=feed, args=(process.stdin,), daemon=True)
+    feeder.start()
+    # Nobody reads the output: a pipe's worth of it, and the queues, are full before the input ends.
+    feeder.join(60 if policy == "drop" else 4)
+    assert feeder.is_alive() == (policy == "block")
+    process.stdin = None
+    coded, told = process.communicate(timeout=120)
+    assert process.returncode == 0, told
+    out = tmp_path / "out.mcap"
+    out.write_bytes(coded)
+    info = json.loads(succeeds("info", out, "--json"))
+    assert info["frames"] + info["dropped"] == count
+    assert (info["dropped"] > 0) == (policy == "drop")
+    line = f"{info['dropped']} frame sets, left out while encoding live"
+    assert line in succeeds("info", out)
+    assert (f"{info['dropped']} frame sets dropped" in told.decode()) == (policy == "drop")
+    assert validate(out) == []
 
 
 def test_a_slow_reader_lets_the_input_wait_where_nothing_may_be_lost() -> None:

@@ -20,6 +20,7 @@ from mvcodec.cli.progress import progress
 from mvcodec.cli.standard_streams import STANDARD, standard_input, standard_output
 from mvcodec.container import McapWriter
 from mvcodec.container.chunked_file import CHUNK_MS
+from mvcodec.container.chunks import DROPPED_KEY
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import FrameSet
@@ -103,7 +104,7 @@ def _run(
             progress("encode", None, quiet=arguments.quiet) as bar,
         ):
             live.run(frame_sets, interrupted, bar.update)
-            writer.note({"dropped": str(live.dropped)})
+            writer.note({DROPPED_KEY: str(live.dropped)})
     except (MvCodecError, OSError) as error:
         if not writer.frame_count or str(arguments.output) == STANDARD:
             raise

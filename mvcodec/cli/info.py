@@ -31,6 +31,8 @@ def run(arguments: argparse.Namespace) -> None:
     size = "half" if info.header.disparity_scale == 2 else "full"
     print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras, maps of {size} size")
     print(f"  calibration  {'given' if array.calibration.given else 'nominal (the input stated none)'}")
+    if info.dropped is not None:
+        print(f"  dropped      {count(info.dropped, 'frame set')}, left out while encoding live")
     for name, bits in asdict(info.bits).items():
         print(f"  {name:11}  {bits / 1000:.1f} kbit")
 
@@ -42,6 +44,7 @@ def document(info: StreamInfo) -> dict[str, Any]:
         "grid": [array.rows, array.cols],
         "real": [list(position) for position in array.real],
         "frames": info.frames,
+        "dropped": info.dropped,
         "fps": array.fps,
         "size": [array.width, array.height],
         "bits": asdict(info.bits),

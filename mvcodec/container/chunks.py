@@ -6,6 +6,7 @@ import io
 import json
 from bisect import bisect_left
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import BinaryIO
 
 from mcap.data_stream import ReadDataStream
@@ -38,6 +39,9 @@ EXPECTED = "an MCAP file written by mvcodec"
 METADATA_NAME = "mvcodec"
 TOPICS_KEY = "topics"
 """In a metadata record: which topic each channel is, for readers that lack the first chunk."""
+
+DROPPED_KEY = "dropped"
+"""In a metadata record: how many frame sets a live encoder left out."""
 
 TopicMessage = tuple[str, Message]
 OnDamage = Callable[[StreamError], None]
@@ -72,6 +76,7 @@ class ChunkReader:
         self._channels: dict[int, Channel] = {}
         self._schemas: dict[int, Schema] = {}
         self._fallback: dict[int, str] = {}
+        self._facts: dict[str, str] = {}
         self._last_time_ns: int | None = None
         self._damaged = False
         self._index_damage = ""
@@ -100,6 +105,16 @@ class ChunkReader:
     def topics(self) -> set[str]:
         """The topics seen so far: all of an indexed file."""
         return {channel.topic for channel in self._channels.values()}
+
+    def facts(self) -> dict[str, str]:
+        """What our metadata records say: all of an indexed file's, else those that came by."""
+        for offset in self._index.metadata if self._index is not None else ():
+            self._file.seek(offset)
+            with suppress(RecordError, CutOff):  # no frame set depends on them
+                record = read_record(self._file, self._limits)
+                if record is not None and record[0] == Opcode.METADATA:
+                    self._facts.update(_facts(record[1]))
+        return self._facts
 
     def schema_of(self, topic: str) -> tuple[str, str]:
         """Name of the schema and message encoding of a topic seen so far; empty where there is none."""
@@ -269,13 +284,14 @@ class ChunkReader:
         return topic
 
     def _note_channels(self, content: bytes) -> None:
-        try:
-            record = Metadata.read(ReadDataStream(io.BytesIO(content)))
-            if record.name == METADATA_NAME and TOPICS_KEY in record.metadata:
-                topics = json.loads(record.metadata[TOPICS_KEY])
+        facts = _facts(content)
+        self._facts.update(facts)
+        if TOPICS_KEY in facts:
+            try:
+                topics = json.loads(facts[TOPICS_KEY])
                 self._fallback = {int(number): str(topic) for number, topic in topics.items()}
-        except (*DAMAGE, TypeError, AttributeError, RecursionError) as error:
-            raise RecordError(f"damaged metadata ({error})") from None
+            except (ValueError, TypeError, AttributeError, RecursionError) as error:
+                raise RecordError(f"damaged metadata ({error})") from None
 
     def _salvage(self, content: bytes) -> list[TopicMessage]:
         """What is there of a chunk that breaks off. Its checksum is lost; decoders find damage."""
@@ -318,6 +334,15 @@ class ChunkReader:
         if self._on_damage is None:
             raise error
         self._on_damage(error)
+
+
+def _facts(content: bytes) -> dict[str, str]:
+    """The keys and values of a metadata record; none of another program's."""
+    try:
+        record = Metadata.read(ReadDataStream(io.BytesIO(content)))
+    except DAMAGE as error:
+        raise RecordError(f"damaged metadata ({error})") from None
+    return record.metadata if record.name == METADATA_NAME else {}
 
 
 def _compare(head: ChunkHead, index: ChunkIndex) -> None:

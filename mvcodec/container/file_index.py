@@ -18,6 +18,8 @@ from mvcodec.container.records import DAMAGE, HEAD, MAGIC, RecordError, parse_ch
 _FOOTER = struct.Struct("<QQI")
 """Start of the summary, start of its offsets, CRC of the summary up to this field."""
 
+_OFFSET = struct.Struct("<Q")
+
 _TAIL_BYTES = HEAD.size + _FOOTER.size + len(MAGIC)
 _CRC_BYTES = 4
 
@@ -30,11 +32,13 @@ class FileIndex:
         channels: by number.
         schemas: by number.
         chunks: in the order of the file.
+        metadata: where the metadata records are, in the order of the file.
     """
 
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
     chunks: list[ChunkIndex] = field(default_factory=list)
+    metadata: list[int] = field(default_factory=list)
 
 
 def read_index(file: ExactFile, limits: Limits) -> FileIndex | None:
@@ -92,6 +96,8 @@ def _parse(summary: bytes, end: int) -> FileIndex | None:
             index.schemas[schema.id] = schema
         elif opcode == Opcode.CHUNK_INDEX:
             index.chunks.append(_chunk_index(content, end))
+        elif opcode == Opcode.METADATA_INDEX and len(content) >= _OFFSET.size:
+            index.metadata.append(_OFFSET.unpack_from(content)[0])
     index.chunks.sort(key=lambda chunk: chunk.chunk_start_offset)
     return index if index.chunks else None
 

@@ -33,11 +33,13 @@ class StreamInfo:
 
     Attributes:
         frames: frame sets.
+        dropped: frame sets that a live encoder left out; None where the file says nothing of it.
     """
 
     header: StreamHeader
     frames: int
     bits: Bits
+    dropped: int | None = None
 
 
 def read_info(source: str | Path | BinaryIO) -> StreamInfo:
@@ -52,6 +54,8 @@ def read_info(source: str | Path | BinaryIO) -> StreamInfo:
         for number, packet in reader.packets():
             sizes[packet.track.kind] += 8 * len(packet.data)
             frames = number + 1
+        dropped = reader.dropped
         total = 8 * reader.size
     texture, disparity = sizes[TrackKind.TEXTURE], sizes[TrackKind.DISPARITY]
-    return StreamInfo(reader.header, frames, Bits(total, texture, disparity, total - texture - disparity))
+    bits = Bits(total, texture, disparity, total - texture - disparity)
+    return StreamInfo(reader.header, frames, bits, dropped)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from bisect import bisect_right
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ from typing import BinaryIO, Self
 from mcap.records import Message
 
 from mvcodec.container import schemas
-from mvcodec.container.chunks import EXPECTED, ChunkReader, OnDamage, TopicMessage
+from mvcodec.container.chunks import DROPPED_KEY, EXPECTED, ChunkReader, OnDamage, TopicMessage
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.remote import is_url, open_url
 from mvcodec.errors import InputError, MvCodecWarning, SettingError, StreamError
@@ -99,6 +100,12 @@ class McapReader:
     def size(self) -> int:
         """Bytes of the input: a file's size; of a pipe, what was read so far."""
         return self._chunks.size
+
+    @property
+    def dropped(self) -> int | None:
+        """Frame sets that a live encoder left out; None where nothing is said, or not yet."""
+        said = self._chunks.facts().get(DROPPED_KEY, "")
+        return int(said) if re.fullmatch(r"[0-9]{1,18}", said) else None
 
     @property
     def frame_count(self) -> int | None:
