@@ -14,8 +14,8 @@ from mvcodec.frames import DecodedSet, DisparityMap, FloatMap, Picture, Rendered
 SCALES = (1.0, 0.75, 0.5)
 """Of the picture's sides."""
 
-BUDGET_S = 0.052
-"""For making a picture: 15 a second, with time to send and draw it."""
+BUDGET_S = 0.062
+"""For making a picture: 15 a second, with time to hand it over. It is drawn while the next one is made."""
 
 WINDOW = 4
 """Pictures that are averaged before the scale may change."""

@@ -89,7 +89,7 @@ class PictureMaker:
         picture, legend = look.compose(
             replace(decoded, disparity_range_px=stored.decoded.disparity_range_px), views
         )
-        jpeg = _jpeg(picture)
+        jpeg = to_jpeg(picture)
         done = time.perf_counter()
         facts = {
             "frame": request.frame,
@@ -157,7 +157,8 @@ class _Drafts:
         return draft
 
 
-def _jpeg(picture: Picture) -> bytes:
+def to_jpeg(picture: Picture) -> bytes:
+    """Code a picture as JPEG, quality JPEG_QUALITY."""
     # Full chroma: overlays and anaglyphs live by their colours.
     options = [
         cv2.IMWRITE_JPEG_QUALITY,

@@ -49,7 +49,8 @@ def measure_spread(decoded: DecodedSet) -> float:
     FALLBACK where no two cameras across a cell share enough of the scene.
     """
     pairs_beside, pairs_across = _pairs(decoded)
-    lumas = {camera: _luma(decoded, camera) for pair in pairs_beside + pairs_across for camera in pair}
+    cameras = {camera for pair in pairs_beside + pairs_across for camera in pair}
+    lumas = {camera: _luma(decoded, camera) for camera in cameras}
     beside = _mean_difference(decoded, lumas, pairs_beside)
     across = _mean_difference(decoded, lumas, pairs_across)
     if beside is None or across is None:
