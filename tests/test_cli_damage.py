@@ -56,6 +56,19 @@ def test_damage_stops_decoding_by_default_and_what_was_decoded_stays(flipped: Pa
     assert [path.suffix for path in (tmp_path / "mp4").iterdir()] == [".mp4"]
 
 
+def test_a_file_cut_before_its_first_whole_frame_set_has_nothing_to_decode(
+    file: bytes, tmp_path: Path
+) -> None:
+    path, out = tmp_path / "cut.mcap", tmp_path / "out"
+    for size in (8, 100, 3000):
+        path.write_bytes(file[:size])
+        for command in (("decode", path, out), ("recover", path, tmp_path / "clean.mcap")):
+            line = fails(1, *command)
+            assert "found a file cut off before its first frame set ended" in line
+        assert not out.exists()
+        assert not (tmp_path / "clean.mcap").exists()
+
+
 def test_damage_is_skipped_where_that_is_asked_for(flipped: Path, tmp_path: Path) -> None:
     done = mvcodec("decode", flipped, tmp_path / "out", "--on-error", "skip")
     assert done.returncode == 0
