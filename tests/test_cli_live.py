@@ -20,7 +20,7 @@ from small_arrays import write_array
 
 from mvcodec.capture.recording import Recording, RecordingSettings
 from mvcodec.container import McapReader, McapWriter, read_info
-from mvcodec.container.chunks import DROPPED_KEY
+from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.decoder import Decoder
 from mvcodec.encoder import Encoder
 from mvcodec.errors import OutputError, SettingError

@@ -20,7 +20,7 @@ from mvcodec.cli.progress import progress
 from mvcodec.cli.standard_streams import STANDARD, standard_input, standard_output
 from mvcodec.container import McapWriter
 from mvcodec.container.chunked_file import CHUNK_MS
-from mvcodec.container.chunks import DROPPED_KEY
+from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import FrameSet

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 from bisect import bisect_left
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -11,8 +10,9 @@ from typing import BinaryIO
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex, Message, MessageIndex, Metadata, Schema
+from mcap.records import Channel, ChunkIndex, Message, MessageIndex, Schema
 
+from mvcodec.container.declared import Declared
 from mvcodec.container.exact_file import ExactFile
 from mvcodec.container.file_index import FileIndex, read_index
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
@@ -35,13 +35,6 @@ from mvcodec.container.records import (
 from mvcodec.errors import StreamError
 
 EXPECTED = "an MCAP file written by mvcodec"
-
-METADATA_NAME = "mvcodec"
-TOPICS_KEY = "topics"
-"""In a metadata record: which topic each channel is, for readers that lack the first chunk."""
-
-DROPPED_KEY = "dropped"
-"""In a metadata record: how many frame sets a live encoder left out."""
 
 TopicMessage = tuple[str, Message]
 OnDamage = Callable[[StreamError], None]
@@ -73,18 +66,17 @@ class ChunkReader:
     ) -> None:
         self._file = ExactFile(file)
         self._name, self._limits, self._on_damage = name, limits, on_damage
-        self._channels: dict[int, Channel] = {}
-        self._schemas: dict[int, Schema] = {}
-        self._fallback: dict[int, str] = {}
-        self._facts: dict[str, str] = {}
+        self._declared = Declared()
         self._last_time_ns: int | None = None
         self._damaged = False
         self._index_damage = ""
         self.cut_off = self.partial = False
         self._index = self._read_index() if file.seekable() else None
         if self._index is not None:
-            self._channels.update(self._index.channels)
-            self._schemas.update(self._index.schemas)
+            for channel in self._index.channels.values():
+                self._declared.add(channel)
+            for schema in self._index.schemas.values():
+                self._declared.add(schema)
 
     @property
     def indexed(self) -> bool:
@@ -104,7 +96,7 @@ class ChunkReader:
     @property
     def topics(self) -> set[str]:
         """The topics seen so far: all of an indexed file."""
-        return {channel.topic for channel in self._channels.values()}
+        return self._declared.topics
 
     def facts(self) -> dict[str, str]:
         """What our metadata records say: all of an indexed file's, else those that came by."""
@@ -113,14 +105,12 @@ class ChunkReader:
             with suppress(RecordError, CutOff):  # no frame set depends on them
                 record = read_record(self._file, self._limits)
                 if record is not None and record[0] == Opcode.METADATA:
-                    self._facts.update(_facts(record[1]))
-        return self._facts
+                    self._declared.note(record[1])
+        return self._declared.facts
 
     def schema_of(self, topic: str) -> tuple[str, str]:
         """Name of the schema and message encoding of a topic seen so far; empty where there is none."""
-        channel = next((channel for channel in self._channels.values() if channel.topic == topic), None)
-        schema = None if channel is None else self._schemas.get(channel.schema_id)
-        return "" if schema is None else schema.name, "" if channel is None else channel.message_encoding
+        return self._declared.schema_of(topic)
 
     def chunks(self, first: int = 0, end_ns: int | None = None) -> Iterator[list[TopicMessage]]:
         """The chunks in file order; if the file is indexed, from chunk `first` and before a time."""
@@ -138,7 +128,7 @@ class ChunkReader:
     def times(self, topic: str) -> list[int]:
         """Log times of a topic's messages in an indexed file, ascending, ns."""
         assert self._index is not None
-        numbers = [number for number, channel in self._channels.items() if channel.topic == topic]
+        numbers = self._declared.numbers_of(topic)
         times: list[int] = []
         for chunk in self._index.chunks:
             for number in numbers:
@@ -232,17 +222,15 @@ class ChunkReader:
             if opcode == Opcode.CHUNK:
                 return self._chunk(content)
             if opcode == Opcode.CHANNEL:
-                channel = parse_channel(content)
-                self._channels[channel.id] = channel
+                self._declared.add(parse_channel(content))
             elif opcode == Opcode.SCHEMA:
-                schema = parse_schema(content)
-                self._schemas[schema.id] = schema
+                self._declared.add(parse_schema(content))
             elif opcode == Opcode.METADATA:
-                self._note_channels(content)
+                self._declared.note(content)
             elif opcode == Opcode.MESSAGE:
                 message = parse_message(content)
                 self._last_time_ns = message.log_time
-                topic = self._topic(message)
+                topic = self._declared.topic(message)
                 return [(topic, message)] if topic else []
         except RecordError as error:
             self._report(str(error))
@@ -259,39 +247,19 @@ class ChunkReader:
             self._file.give_back(content)
             find_chunk(self._file, self._limits)
         except RecordError as error:
-            self._report(str(error), times, list(self._channels))
+            self._report(str(error), times, self._declared.numbers)
         return []
 
     def _messages(self, data: bytes, *, whole: bool = True) -> list[TopicMessage]:
         messages = []
         for item in chunk_records(data, whole=whole):
-            if isinstance(item, Channel):
-                self._channels[item.id] = item
-            elif isinstance(item, Schema):
-                self._schemas[item.id] = item
-            elif topic := self._topic(item):
+            if isinstance(item, Channel | Schema):
+                self._declared.add(item)
+            elif topic := self._declared.topic(item):
                 messages.append((topic, item))
         if messages:
             self._last_time_ns = messages[-1][1].log_time
         return messages
-
-    def _topic(self, message: Message) -> str | None:
-        """A message's topic; None where channels were lost and this one is not among those said twice."""
-        channel = self._channels.get(message.channel_id)
-        topic = self._fallback.get(message.channel_id) if channel is None else channel.topic
-        if topic is None and not self._fallback:
-            raise RecordError(f"a message of unknown channel {message.channel_id}")
-        return topic
-
-    def _note_channels(self, content: bytes) -> None:
-        facts = _facts(content)
-        self._facts.update(facts)
-        if TOPICS_KEY in facts:
-            try:
-                topics = json.loads(facts[TOPICS_KEY])
-                self._fallback = {int(number): str(topic) for number, topic in topics.items()}
-            except (ValueError, TypeError, AttributeError, RecursionError) as error:
-                raise RecordError(f"damaged metadata ({error})") from None
 
     def _salvage(self, content: bytes) -> list[TopicMessage]:
         """What is there of a chunk that breaks off. Its checksum is lost; decoders find damage."""
@@ -322,9 +290,7 @@ class ChunkReader:
         self._damaged = True
         where = self._name
         if times_ns is not None:
-            topics = sorted(
-                {self._channels[number].topic for number in channels or () if number in self._channels}
-            )
+            topics = sorted(self._declared.topics_of(channels or ()))
             others = f" and {len(topics) - 1} more topics" if len(topics) > 1 else ""
             named = f"{topics[0]}{others} " if topics else ""
             where += f": {named}at {times_ns[0] / 1e9:.3f}..{times_ns[1] / 1e9:.3f} s"
@@ -334,15 +300,6 @@ class ChunkReader:
         if self._on_damage is None:
             raise error
         self._on_damage(error)
-
-
-def _facts(content: bytes) -> dict[str, str]:
-    """The keys and values of a metadata record; none of another program's."""
-    try:
-        record = Metadata.read(ReadDataStream(io.BytesIO(content)))
-    except DAMAGE as error:
-        raise RecordError(f"damaged metadata ({error})") from None
-    return record.metadata if record.name == METADATA_NAME else {}
 
 
 def _compare(head: ChunkHead, index: ChunkIndex) -> None:

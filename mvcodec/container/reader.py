@@ -14,7 +14,8 @@ from typing import BinaryIO, Self
 from mcap.records import Message
 
 from mvcodec.container import schemas
-from mvcodec.container.chunks import DROPPED_KEY, EXPECTED, ChunkReader, OnDamage, TopicMessage
+from mvcodec.container.chunks import EXPECTED, ChunkReader, OnDamage, TopicMessage
+from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.remote import is_url, open_url
 from mvcodec.errors import InputError, MvCodecWarning, SettingError, StreamError

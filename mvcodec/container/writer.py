@@ -12,7 +12,7 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 
 from mvcodec.container import schemas
 from mvcodec.container.chunked_file import CHUNK_MS, ChunkedFile, MessageListener
-from mvcodec.container.chunks import METADATA_NAME, TOPICS_KEY
+from mvcodec.container.declared import METADATA_NAME, TOPICS_KEY
 from mvcodec.errors import StreamClosed
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, TrackKind
 
