@@ -5,15 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
+from mvcodec.closing import Closing
 from mvcodec.errors import InputError
 
 POLL_S = 0.02
 
 
-class FollowedFile:
+class FollowedFile(Closing):
     """Waits at the end of a file for more, until it is told to stop.
 
     A reader of MCAP stops by itself where the file is complete.
@@ -53,11 +52,3 @@ class FollowedFile:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

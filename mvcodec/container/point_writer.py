@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
@@ -13,6 +11,7 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap_protobuf.schema import build_file_descriptor_set
 from numpy.typing import NDArray
 
+from mvcodec.closing import Closing
 from mvcodec.container.chunked_file import ChunkedFile
 from mvcodec.container.schemas import RIG_FRAME
 
@@ -30,7 +29,7 @@ _FIELDS = [
 ]
 
 
-class PointWriter:
+class PointWriter(Closing):
     """Writes point clouds on `/points`, in the frame `rig`, one for each frame set.
 
     Raises:
@@ -65,11 +64,3 @@ class PointWriter:
     def close(self) -> None:
         """Complete the file."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

@@ -8,11 +8,11 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
-from types import TracebackType
-from typing import BinaryIO, Self
+from typing import BinaryIO
 
 from mcap.records import Message
 
+from mvcodec.closing import Closing
 from mvcodec.container import schemas
 from mvcodec.container.chunks import EXPECTED, ChunkReader, OnDamage, TopicMessage
 from mvcodec.container.declared import DROPPED_KEY
@@ -22,7 +22,7 @@ from mvcodec.errors import InputError, MvCodecWarning, SettingError, StreamError
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track
 
 
-class McapReader:
+class McapReader(Closing):
     """Reads the packets of a file or stream.
 
     A complete file is read by its index: a range of frames costs only the chunks that hold it.
@@ -183,14 +183,6 @@ class McapReader:
         """Close the file if it was opened here."""
         if self._owned is not None:
             self._owned.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _first_header(self) -> Message:
         """The first header's message; what was read with it stays to be read."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import BinaryIO, Self
+from typing import BinaryIO
 
 from mvcodec.array import CameraArray, Viewpoint
+from mvcodec.closing import Closing
 from mvcodec.container import schemas
 from mvcodec.container.chunked_file import CHUNK_MS, ChunkedFile
 
 
-class VideoTopicsWriter:
+class VideoTopicsWriter(Closing):
     """Writes videos of viewpoints: `/view/NAME/video`, with calibration and place of each.
 
     Args:
@@ -62,14 +62,6 @@ class VideoTopicsWriter:
         if not self._closed:
             self._closed = True
             self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _start(self) -> None:
         self._file.open()

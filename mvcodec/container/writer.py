@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import BinaryIO, Self
+from typing import BinaryIO
 
 from mcap.well_known import MessageEncoding, SchemaEncoding
 
+from mvcodec.closing import Closing
 from mvcodec.container import schemas
 from mvcodec.container.chunked_file import CHUNK_MS, ChunkedFile, MessageListener
 from mvcodec.container.declared import METADATA_NAME, TOPICS_KEY
@@ -17,7 +17,7 @@ from mvcodec.errors import StreamClosed
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, TrackKind
 
 
-class McapWriter:
+class McapWriter(Closing):
     """Writes packets into a file, from the first frame set on.
 
     Args:
@@ -78,14 +78,6 @@ class McapWriter:
         if not self._closed:
             self._closed = True
             self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _start(self, packets: Sequence[Packet]) -> None:
         first = packets[0]

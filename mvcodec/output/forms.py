@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from mvcodec.array import Calibration, CameraArray, Position, Viewpoint
+from mvcodec.closing import Closing
 from mvcodec.errors import OutputError, SettingError, StreamClosed
 from mvcodec.frames import Picture
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
@@ -113,7 +114,7 @@ class ArrayForm:
         self._writer.__exit__(kind, error, trace)
 
 
-class PictureForm:
+class PictureForm(Closing):
     """A folder of numbered PNG pictures for each viewpoint: ``r00_c00/000000.png``."""
 
     def __init__(self, target: Path, plan: OutputPlan) -> None:
@@ -130,12 +131,6 @@ class PictureForm:
     def close(self) -> None:
         """Every picture is complete already."""
         self._pool.shutdown()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 class VideoForm:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, cast
+from typing import TYPE_CHECKING, Any, cast
 
+from mvcodec.closing import Closing
 from mvcodec.errors import MissingExtra, SettingError
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ _STREAMS = frozenset({"foxglove.CompressedVideo", "foxglove.RawImage"})
 """Schemas of what comes with each frame set; all else comes with keyframes, and again to late joiners."""
 
 
-class LiveView:
+class LiveView(Closing):
     """Serves what is written into a file to any number of Foxglove clients; see `MessageListener`.
 
     Who joins late gets the rig with the next frame set, and pictures from the next keyframe on
@@ -98,11 +98,3 @@ class LiveView:
     def close(self) -> None:
         """Stop the server."""
         self._server.stop()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

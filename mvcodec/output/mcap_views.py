@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import TracebackType
-from typing import BinaryIO, Self
+from typing import BinaryIO
 
+from mvcodec.closing import Closing
 from mvcodec.container.video_topics import VideoTopicsWriter
 from mvcodec.frames import Picture
 from mvcodec.output.forms import OutputPlan
@@ -25,7 +25,7 @@ _KEYFRAME_NS = 1_000_000_000
 _WORKERS = 2
 
 
-class McapViews:
+class McapViews(Closing):
     """Codes and writes the pictures of a plan's viewpoints, frame by frame, each at once.
 
     Args:
@@ -69,11 +69,3 @@ class McapViews:
         """Complete the file."""
         self._pool.shutdown()
         self._writer.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
