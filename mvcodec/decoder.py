@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Literal, Self, get_args
@@ -17,6 +18,7 @@ from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.errors import MissingReference, MvCodecWarning, SettingError, StreamClosed, StreamError
 from mvcodec.frames import DecodedSet, DisparityMap, Picture
 from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, view_name
+from mvcodec.synthesis.derived_maps import derive_map
 from mvcodec.synthesis.stand_in import fill_absent
 from mvcodec.video.codec import Planes
 from mvcodec.video.colour import even_size, to_picture
@@ -228,19 +230,24 @@ class Decoder:
         self._skipping = True
 
     def _decode(self, packets: PacketSet) -> list[DecodedSet]:
-        """Decode a frame set; nothing, where no camera is there."""
+        """Decode a frame set; nothing, where no camera with a map is there."""
         planes, reasons = self._planes(packets)
         array, span, first = self.header.array, self.header.disparity_range_px, packets.first
         self._tell_absent(reasons, first)
         there = [camera for camera in array.real if camera not in reasons]
-        if not there:
+        senders = [camera for camera in self.header.map_cameras if camera not in reasons]
+        if not senders:
             return []
         assert self._pool is not None
         textures = [planes[Track(TrackKind.TEXTURE, camera)] for camera in there]
-        maps = [planes[Track(TrackKind.DISPARITY, camera)] for camera in there]
+        maps = [planes[Track(TrackKind.DISPARITY, camera)] for camera in senders]
         pictures = dict(zip(there, self._pool.map(self._picture, textures), strict=True))
-        found = self._pool.map(self._map, maps, pictures.values())
-        disparities = dict(zip(there, found, strict=True))
+        found = self._pool.map(self._map, maps, [pictures[camera] for camera in senders])
+        sent = dict(zip(senders, found, strict=True))
+        others = [camera for camera in there if camera not in sent]
+        derived = self._pool.map(partial(derive_map, array, sent, span), others)
+        known = sent | dict(zip(others, derived, strict=True))
+        disparities = {camera: known[camera] for camera in there}
         if reasons:
             pictures, disparities = fill_absent(array, pictures, disparities)
         absent = tuple(camera for camera in array.real if camera in reasons)

@@ -17,7 +17,16 @@ from mvcodec.depth import depth_mm
 from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stereo.matcher import Matcher
-from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind, view_name
+from mvcodec.stream import (
+    DISPARITY_CAMERAS,
+    HEADER_TRACK,
+    Packet,
+    StreamHeader,
+    Track,
+    TrackKind,
+    map_cameras,
+    view_name,
+)
 from mvcodec.video.codec import (
     CodedPicture,
     Planes,
@@ -29,7 +38,11 @@ from mvcodec.video.codec import (
 )
 from mvcodec.video.colour import even_size, grey_planes, to_planes
 from mvcodec.video.disparity_code import quantise
-from mvcodec.video.disparity_rate import default_disparity_qp, default_disparity_scale
+from mvcodec.video.disparity_rate import (
+    default_disparity_cameras,
+    default_disparity_qp,
+    default_disparity_scale,
+)
 from mvcodec.video.map_size import MEDIANS, check_median, check_scale, coded_size, to_coded
 from mvcodec.video.table import find_codec
 
@@ -39,8 +52,8 @@ KEYFRAME_NS = 1_000_000_000
 """A keyframe comes after this time at the latest, whatever the nominal frame rate says."""
 
 DISPARITY_SHARE = 0.12
-"""The maps' share in bitrate mode; at the best map QP it is 0.09 to 0.18 on shop_v3, 0.06 to 0.08 on shop_v4
-and 0.10 to 0.16 on the sample, for pictures of QP 27 to 35."""
+"""The maps' share in bitrate mode where every camera sends one; at the best map QP it is 0.09 to 0.18 on
+shop_v3, 0.06 to 0.08 on shop_v4 and 0.10 to 0.16 on the sample, for pictures of QP 27 to 35."""
 
 
 def default_gop(fps: float) -> int:
@@ -61,6 +74,8 @@ class EncoderConfig:
             a DISPARITY_SHARE of the bit rate. Given, bitrate_kbps is that of the pictures alone.
         disparity_scale: 2: maps are coded at half the pictures' size each way, 1: at all of it; by
             default `default_disparity_scale`.
+        disparity_cameras: the cameras that send a map: all, or alternate: every second one of a row and
+            a column, and the decoder derives the others'; by default `default_disparity_cameras`.
         disparity_median: window of the median that maps are smoothed with before coding, odd, px of
             the coded map; 0: off; by default `MEDIANS` has it for the scale.
         gop: frame sets from keyframe to keyframe, at most one second; by default one second.
@@ -87,6 +102,7 @@ class EncoderConfig:
     codec: str = "h264"
     disparity_scale: int | None = None
     disparity_median: int | None = None
+    disparity_cameras: str | None = None
     depth: bool = False
 
     def __post_init__(self) -> None:
@@ -97,6 +113,8 @@ class EncoderConfig:
         check_preset(self.preset)
         check_scale(self.disparity_scale)
         check_median(self.disparity_median)
+        if self.disparity_cameras not in {None, *DISPARITY_CAMERAS}:
+            raise SettingError("disparity_cameras", self.disparity_cameras, " or ".join(DISPARITY_CAMERAS))
         if self.gop is not None and self.gop < 1:
             raise SettingError("gop", self.gop, "at least 1")
         span = self.disparity_range_px
@@ -119,11 +137,17 @@ class EncoderConfig:
         given = self.disparity_median
         return MEDIANS[self.scale_for(array)] if given is None else given
 
+    def cameras_for(self, array: CameraArray) -> str:
+        """Which real cameras of an array send a map, as `StreamHeader.disparity_cameras`."""
+        return self.disparity_cameras or default_disparity_cameras(self.quality, self.codec, array)
+
     def rate_of_pictures(self, array: CameraArray) -> RateControl:
         """The rate control of one camera's pictures."""
         if self.bitrate_kbps is None:
             return RateControl(qp=self.qp, crf=self.crf)
-        return _share(self.bitrate_kbps, 1.0 if self.disparity_qp is not None else 1 - DISPARITY_SHARE, array)
+        senders = map_cameras(array, self.cameras_for(array))
+        maps = DISPARITY_SHARE * len(senders) / len(array.real)
+        return _share(self.bitrate_kbps, 1.0 if self.disparity_qp is not None else 1 - maps, array)
 
     def rate_of_maps(self, array: CameraArray, range_px: tuple[float, float]) -> RateControl:
         """The rate control of one camera's maps; `range_px` is the header's."""
@@ -167,7 +191,8 @@ class Encoder:
         self._scale = self.config.scale_for(array)
         self._median = self.config.median_for(array)
         size = even_size(array.width, array.height)
-        self._encoders = self._make_encoders(TrackKind.TEXTURE, size, self.config.rate_of_pictures(array))
+        rate = self.config.rate_of_pictures(array)
+        self._encoders = self._make_encoders(TrackKind.TEXTURE, array.real, size, rate)
         self._header: StreamHeader | None = None
         self._position = 0  # frame sets since the last keyframe, modulo the GOP
         self._key_ns = 0
@@ -234,9 +259,9 @@ class Encoder:
         maps = self._matcher.match(self.array, pictures, self._header.disparity_range_px)
         values = {camera: self._checked_map(maps, camera) for camera in self.array.real}
         self._maps = values
-        for camera, disparity in values.items():
+        for camera in self._header.map_cameras:
             track = Track(TrackKind.DISPARITY, camera)
-            jobs[track] = pool.submit(self._code_map, track, disparity, keyframe)
+            jobs[track] = pool.submit(self._code_map, track, values[camera], keyframe)
 
     def flush(self) -> list[Packet]:
         """End the stream. Returns nothing, since no packet waits; `push` is an error from now on."""
@@ -256,16 +281,16 @@ class Encoder:
         self.flush()
 
     def _make_encoders(
-        self, kind: TrackKind, size: tuple[int, int], rate: RateControl
+        self, kind: TrackKind, cameras: tuple[Position, ...], size: tuple[int, int], rate: RateControl
     ) -> dict[Track, VideoEncoder]:
-        array, codec = self.array, find_codec(self.config.codec)
-        settings = VideoSettings(kind, *size, array.fps, self._gop, rate, self.config.preset)
-        return {Track(kind, camera): codec.encoder(settings) for camera in array.real}
+        codec = find_codec(self.config.codec)
+        settings = VideoSettings(kind, *size, self.array.fps, self._gop, rate, self.config.preset)
+        return {Track(kind, camera): codec.encoder(settings) for camera in cameras}
 
     def _make_map_encoders(self, header: StreamHeader) -> dict[Track, VideoEncoder]:
         size = coded_size(self.array.width, self.array.height, self._scale)
         rate = self.config.rate_of_maps(self.array, header.disparity_range_px)
-        return self._make_encoders(TrackKind.DISPARITY, size, rate)
+        return self._make_encoders(TrackKind.DISPARITY, header.map_cameras, size, rate)
 
     def _make_header(self, frames: FrameSet) -> StreamHeader:
         span = self.config.disparity_range_px
@@ -274,7 +299,8 @@ class Encoder:
 
             span = estimate_range(self.array, [frames], self.array.disparity_hint_px)
         settings = self._settings_record(self.config.rate_of_maps(self.array, span))
-        return StreamHeader(self.array, span, self.config.codec, frames.index, settings, self._scale)
+        codec, cameras = self.config.codec, self.config.cameras_for(self.array)
+        return StreamHeader(self.array, span, codec, frames.index, settings, self._scale, cameras)
 
     def _settings_record(self, maps: RateControl) -> dict[str, Any]:
         config, codec = self.config, find_codec(self.config.codec)

@@ -17,6 +17,9 @@ FORMAT_VERSION = 1
 DISPARITY_SCALES = (1, 2)
 """Pixels of a picture, each way, for one sample of its map."""
 
+DISPARITY_CAMERAS = ("all", "alternate")
+"""Which real cameras send a map: every one, or every second one, as the white fields of a chess board."""
+
 
 class TrackKind(StrEnum):
     """What a track carries."""
@@ -86,6 +89,7 @@ class StreamHeader:
         first_frame: index in the input of the first coded frame.
         settings: the encoder's settings, for the record (names and plain JSON values).
         disparity_scale: 1 or 2: the maps are coded at the pictures' size, or at half of it each way.
+        disparity_cameras: one of DISPARITY_CAMERAS.
     """
 
     array: CameraArray
@@ -94,6 +98,7 @@ class StreamHeader:
     first_frame: int = 0
     settings: Mapping[str, Any] = field(default_factory=dict)
     disparity_scale: int = 1
+    disparity_cameras: str = "all"
 
     def __post_init__(self) -> None:
         low, high = self.disparity_range_px
@@ -102,12 +107,20 @@ class StreamHeader:
         if self.disparity_scale not in DISPARITY_SCALES:
             expected = " or ".join(map(str, DISPARITY_SCALES))
             raise SettingError("disparity_scale", self.disparity_scale, expected)
+        if self.disparity_cameras not in DISPARITY_CAMERAS:
+            raise SettingError("disparity_cameras", self.disparity_cameras, " or ".join(DISPARITY_CAMERAS))
 
     @property
     def tracks(self) -> tuple[Track, ...]:
-        """The video tracks: pictures of every real camera, then maps of every real camera."""
-        kinds = (TrackKind.TEXTURE, TrackKind.DISPARITY)
-        return tuple(Track(kind, camera) for kind in kinds for camera in self.array.real)
+        """The video tracks: pictures of every real camera, then the maps."""
+        pictures = (Track(TrackKind.TEXTURE, camera) for camera in self.array.real)
+        maps = (Track(TrackKind.DISPARITY, camera) for camera in self.map_cameras)
+        return (*pictures, *maps)
+
+    @property
+    def map_cameras(self) -> tuple[Position, ...]:
+        """The real cameras that send a map."""
+        return map_cameras(self.array, self.disparity_cameras)
 
     def to_json(self) -> bytes:
         """UTF-8 JSON as FORMAT.md specifies it."""
@@ -119,6 +132,7 @@ class StreamHeader:
             "array": array,
             "disparity_range_px": list(self.disparity_range_px),
             "disparity_scale": self.disparity_scale,
+            "disparity_cameras": self.disparity_cameras,
             "first_frame": self.first_frame,
             "settings": dict(self.settings),
         }
@@ -168,7 +182,20 @@ class StreamHeader:
             first_frame=int(document["first_frame"]),
             settings=dict(document["settings"]),
             disparity_scale=int(document.get("disparity_scale", 1)),
+            disparity_cameras=str(document.get("disparity_cameras", "all")),
         )
+
+
+def map_cameras(array: CameraArray, which: str) -> tuple[Position, ...]:
+    """The real cameras that send a map, in row order; `which` is one of DISPARITY_CAMERAS."""
+    if which == "all":
+        return array.real
+    return tuple(
+        (row, col)
+        for down, row in enumerate(array.real_rows)
+        for across, col in enumerate(array.real_cols)
+        if (down + across) % 2 == 0
+    )
 
 
 def view_name(position: Position) -> str:

@@ -115,7 +115,7 @@ def test_stock_decoders_see_the_maps_at_half_size() -> None:
 
 
 def test_cameras_without_their_map_of_half_size_are_made_from_the_others() -> None:
-    packets = encode(ARRAY, 2, qp=40)
+    packets = encode(ARRAY, 2, qp=40, disparity_cameras="all")
     assert StreamHeader.from_json(packets[0][0].data).disparity_scale == 2
     lost = Track(TrackKind.DISPARITY, ARRAY.real[1])
     with Decoder() as decoder, pytest.warns(MvCodecWarning, match="go on without camera"):
@@ -407,11 +407,6 @@ def test_maps_follow_the_pictures_quantiser() -> None:
 
 def test_bit_rate_is_that_of_all_tracks_together() -> None:
     kbps = 800.0
-    given = config(qp=None, bitrate_kbps=kbps)
-    rates = [
-        rate.bitrate_kbps for rate in (given.rate_of_pictures(ARRAY), given.rate_of_maps(ARRAY, RANGE_PX))
-    ]
-    assert sum(4 * rate for rate in rates if rate is not None) == pytest.approx(kbps)
     info = read_info(io.BytesIO(encoded_file(ARRAY, 40, qp=None, bitrate_kbps=kbps)))
     assert 0.6 * kbps < info.bits.total / 4 / 1000 < 1.3 * kbps
 

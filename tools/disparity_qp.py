@@ -1,7 +1,8 @@
 """Measures what the maps' quantiser and scale cost and bring on an input, beside what the model chooses.
 
     python tools/disparity_qp.py INPUT [--real ...] [--qp N,N..] [--offsets N,N..] [--codec NAME]
-                                 [--disparity-range LO,HI|auto] [--frames A:B] [--json]
+                                 [--disparity-cameras all|alternate] [--disparity-range LO,HI|auto]
+                                 [--frames A:B] [--json]
 
 Each line is one coding of the input: the pictures' QP, the maps' scale and QP, bits for each time instant
 (of all tracks, without the container), the maps' share of them, luma PSNR over every second view of the
@@ -49,7 +50,9 @@ class Coding:
     chosen: bool
 
 
-def measure(material: Material, qps: Sequence[int], offsets: Sequence[int], codec: str) -> Iterator[Coding]:
+def measure(
+    material: Material, qps: Sequence[int], offsets: Sequence[int], codec: str, cameras: str | None
+) -> Iterator[Coding]:
     """Code with each QP of the pictures, each scale, and map QPs around the model's."""
     for qp in qps:
         best = EncoderConfig(qp=qp, codec=codec).scale_for(material.array)
@@ -63,6 +66,7 @@ def measure(material: Material, qps: Sequence[int], offsets: Sequence[int], code
                     qp=qp,
                     codec=codec,
                     disparity_scale=scale,
+                    disparity_cameras=cameras,
                     disparity_qp=disparity_qp,
                     disparity_range_px=material.range_px,
                 )
@@ -109,7 +113,8 @@ def main() -> int:
 
 def report(material: Material, arguments: argparse.Namespace) -> None:
     """All codings, cheapest first within a QP of the pictures."""
-    codings = list(measure(material, arguments.qp, arguments.offsets, arguments.codec))
+    cameras = arguments.disparity_cameras
+    codings = list(measure(material, arguments.qp, arguments.offsets, arguments.codec, cameras))
     hull = lower_hull(codings)
     rows = [{**asdict(each), "on_hull": each in hull, "excess": excess(each, hull)} for each in codings]
     if arguments.json:

@@ -26,7 +26,7 @@ from mvcodec.evaluation.metrics import luma, psnr
 from mvcodec.evaluation.remembered import MapSpool, Remembered
 from mvcodec.frames import DecodedSet, FrameSet
 from mvcodec.stereo.matcher import Matcher
-from mvcodec.stream import TrackKind
+from mvcodec.stream import DISPARITY_CAMERAS, TrackKind
 from mvcodec.synthesis.table import make_synthesizer
 from mvcodec.video.table import CODECS
 
@@ -101,6 +101,7 @@ def arguments_of(parser: argparse.ArgumentParser, qps: str) -> argparse.Namespac
     )
     parser.add_argument("--codec", choices=CODECS, default="h264")
     parser.add_argument("--disparity-range", type=disparity_range, metavar="LO,HI|auto", help="as for encode")
+    parser.add_argument("--disparity-cameras", choices=DISPARITY_CAMERAS, help="as for encode")
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     add_frames(parser, "frames of the input to code")
     return parser.parse_args(join_negative_values(sys.argv[1:]))

@@ -1,7 +1,8 @@
 """Measures what the video encoder's own settings for maps cost and bring on an input.
 
     python tools/map_settings.py INPUT [--real ...] [--qp N,N..] [--codec h264|hevc] [--set PARAMETERS ..]
-                                 [--disparity-range LO,HI|auto] [--frames A:B] [--json]
+                                 [--disparity-cameras all|alternate] [--disparity-range LO,HI|auto]
+                                 [--frames A:B] [--json]
 
 Each line is one coding of the input, the first one of each QP with the settings that mvcodec uses: the maps'
 kbit for each time instant, luma PSNR over every second view of the first, the middle and the last frame, and
@@ -17,7 +18,7 @@ import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from map_codings import Material, Outcome, arguments_of, code, run
 
@@ -83,9 +84,12 @@ def told(codec: str, parameters: str) -> Iterator[None]:
         table[TrackKind.DISPARITY] = before
 
 
-def measure(material: Material, qps: Sequence[int], codec: str, others: Sequence[str]) -> Iterator[Trial]:
+def measure(
+    material: Material, qps: Sequence[int], codec: str, cameras: str | None, others: Sequence[str]
+) -> Iterator[Trial]:
     """Code with mvcodec's settings at each QP of the pictures, then with the others."""
-    configs = [EncoderConfig(qp=qp, codec=codec, disparity_range_px=material.range_px) for qp in qps]
+    usual_config = EncoderConfig(codec=codec, disparity_cameras=cameras, disparity_range_px=material.range_px)
+    configs = [replace(usual_config, qp=qp) for qp in qps]
     usual = [code(material, config) for config in configs]
     slope = db_for_each_log_bit(usual)
     for qp, config, first in zip(qps, configs, usual, strict=True):
@@ -109,7 +113,8 @@ def report(material: Material, arguments: argparse.Namespace) -> None:
         raise SettingError("--codec", codec, f"one of {', '.join(PARAMETERS)}")
     if len(set(qps)) < 2:
         raise SettingError("--qp", ",".join(map(str, qps)), "at least two, which give the curve's slope")
-    trials = list(measure(material, qps, codec, arguments.set or ALTERNATIVES[codec]))
+    others = arguments.set or ALTERNATIVES[codec]
+    trials = list(measure(material, qps, codec, arguments.disparity_cameras, others))
     if arguments.json:
         rows = [asdict(trial) for trial in trials]
         print(json.dumps({"disparity_range_px": list(material.range_px), "trials": rows}, indent=1))

@@ -14,6 +14,7 @@ from mvcodec.errors import SettingError
 from mvcodec.frames import FrameSet
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
 from mvcodec.stereo.table import MATCHERS
+from mvcodec.stream import DISPARITY_CAMERAS
 from mvcodec.video.codec import PRESETS
 from mvcodec.video.table import CODECS
 
@@ -23,6 +24,7 @@ _OPTIONS = {
     "bitrate_kbps": "--bitrate",
     "disparity_qp": "--disparity-qp",
     "disparity_scale": "--disparity-scale",
+    "disparity_cameras": "--disparity-cameras",
     "disparity_median": "--disparity-median",
     "gop": "--gop",
     "matcher": "--matcher",
@@ -90,6 +92,12 @@ def _add_disparity(parser: argparse.ArgumentParser) -> None:
         help="2: maps at half the pictures' size each way (default: chosen for the pictures' QP)",
     )
     parser.add_argument(
+        "--disparity-cameras",
+        choices=DISPARITY_CAMERAS,
+        help="the real cameras that send a map; alternate: every second one, and decoders derive the others'"
+        " (default: chosen for the pictures' QP)",
+    )
+    parser.add_argument(
         "--disparity-median",
         type=int,
         metavar="N",
@@ -117,6 +125,7 @@ def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: 
         config = EncoderConfig(
             disparity_qp=arguments.disparity_qp,
             disparity_scale=arguments.disparity_scale,
+            disparity_cameras=arguments.disparity_cameras,
             disparity_median=arguments.disparity_median,
             gop=arguments.gop,
             matcher=arguments.matcher,

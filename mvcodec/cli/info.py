@@ -29,7 +29,8 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"  grid         {array.rows} x {array.cols}, {array.width} x {array.height} px, {array.fps:g} fps")
     print(f"  real         {len(array.real)} cameras: rows {rows}, cols {cols}")
     size = "half" if info.header.disparity_scale == 2 else "full"
-    print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras, maps of {size} size")
+    maps = f"maps of {size} size from {count(len(info.header.map_cameras), 'camera')}"
+    print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras, {maps}")
     print(f"  calibration  {'given' if array.calibration.given else 'nominal (the input stated none)'}")
     if info.dropped is not None:
         print(f"  dropped      {count(info.dropped, 'frame set')}, left out while encoding live")
@@ -50,6 +51,7 @@ def document(info: StreamInfo) -> dict[str, Any]:
         "bits": asdict(info.bits),
         "disparity_range_px": list(info.header.disparity_range_px),
         "disparity_scale": info.header.disparity_scale,
+        "disparity_cameras": info.header.disparity_cameras,
         "calibration": "given" if array.calibration.given else "nominal",
     }
 

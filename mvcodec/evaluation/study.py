@@ -210,6 +210,7 @@ class StudyRun:
         span = config.disparity_range_px
         return {
             "scale": config.scale_for(array),
+            "cameras": config.cameras_for(array),
             "median": config.median_for(array),
             # Without a range the encoder estimates one from the pictures, and chooses by that.
             "rate": None if span is None else asdict(config.rate_of_maps(array, span)),

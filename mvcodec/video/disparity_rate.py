@@ -16,6 +16,9 @@ bits at equal PSNR of all views, but in the middle view of the sample (QP 33) th
 things break, for 0.36 dB less than with the pictures' own QP. Half size then costs fewer bits at equal PSNR
 at QP 27 (3 to 4 %; shop_v4: 0.6 %), 30 and 33; at QP 22 full size wins on the sample (2 %), and neither on
 shop_v3. `tools/disparity_qp.py` measures the same on any input.
+
+All that is of maps from every camera. Maps from every second camera, the others derived, cost fewer bits at
+equal PSNR on all three sets: 3 to 4 % at QP 27, 4 to 9 at 32, 5 to 9 at 37; on shop_v3 0.5 % at QP 25.
 """
 
 from __future__ import annotations
@@ -23,6 +26,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from mvcodec.array import CameraArray
 from mvcodec.video.table import find_codec
 
 
@@ -31,7 +35,8 @@ class MapModel:
     """What maps are coded with, from the pictures' QP or CRF, all on the codec's own scale.
 
     Attributes:
-        half_from: the QP from which on maps are coded at half size each way.
+        half_from: the QP from which on maps are coded at half size each way, and only every second
+            camera of an array sends one.
         full: map QP less picture QP for maps of full size whose range is at most REFERENCE_PX wide.
         half: the same for maps of half size.
         octave: what doubles the quantiser's step. A range twice as wide makes a code value worth twice
@@ -49,7 +54,8 @@ REFERENCE_PX = 64.0
 
 H26X = MapModel(half_from=25, full=5, half=0, octave=6)
 
-# Nobody has measured the others: x265's QPs have the steps of x264's, SVT-AV1's are 2.4 times as close.
+# x265's QPs have the steps of x264's: at QP 32 the model's choice is on the hull of both sets tried.
+# SVT-AV1's are 2.4 times as close; nobody has measured them.
 MODELS = {"h264": H26X, "hevc": H26X, "av1": MapModel(half_from=30, full=12, half=0, octave=14)}
 
 MOST_OCTAVES = 2.0
@@ -59,11 +65,22 @@ SMALLEST_HALVED = 64
 """px; maps of smaller pictures are not halved: there is little to gain, and libx265 takes none below 16."""
 
 
+FEWEST_EACH_WAY = 2
+"""Real rows and columns of arrays in which maps are left out: one derived from two sides has few holes."""
+
+
 def default_disparity_scale(quality: float | None, codec: str, width: int, height: int) -> int:
     """1 or 2, as `StreamHeader.disparity_scale`; quality is None where a bit rate governs."""
     if min(width, height) < SMALLEST_HALVED:
         return 1
     return 2 if quality is None or quality >= MODELS[codec].half_from else 1
+
+
+def default_disparity_cameras(quality: float | None, codec: str, array: CameraArray) -> str:
+    """One of DISPARITY_CAMERAS; quality is None where a bit rate governs."""
+    if min(len(array.real_rows), len(array.real_cols)) < FEWEST_EACH_WAY:
+        return "all"
+    return "alternate" if quality is None or quality >= MODELS[codec].half_from else "all"
 
 
 def default_disparity_qp(
