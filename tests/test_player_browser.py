@@ -1,4 +1,4 @@
-"""The page in a real Chromium: what a viewer does, and what is then on the screen.
+"""Watching in a real Chromium: what a viewer does, and what is then on the screen.
 
 Skips where there is no Chromium (Debian: apt install chromium). Screenshots of the main states are left in
 build/screenshots, to be looked at.
@@ -6,48 +6,31 @@ build/screenshots, to be looked at.
 
 from __future__ import annotations
 
-import base64
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from player_files import (
-    FRAMES,
-    GOP,
-    SYNTHESIZER,
-    Running,
-    damage,
-    decode_picture,
-    encode,
-    playing,
-    write_original,
+from browser_page import (
+    CHROMIUM,
+    NO_CHROMIUM,
+    SAME_DB,
+    box_of,
+    on_screen,
+    pixels,
+    rendered,
+    screenshot,
+    settle,
+    show,
+    shows,
 )
-from playwright.sync_api import Browser, FloatRect, Page, sync_playwright
+from player_files import FRAMES, Running
+from playwright.sync_api import Browser, Page
 
-from mvcodec.array import Viewpoint
-from mvcodec.decoder import Decoder
 from mvcodec.evaluation.metrics import psnr
-from mvcodec.frames import Picture
 from mvcodec.player.looks import LOOKS
-from mvcodec.synthesis.table import make_synthesizer
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium (Debian: apt install chromium)")
-
-ARGUMENTS = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
-SCREENSHOTS = Path(__file__).parents[1] / "build" / "screenshots"
-SAME_DB = 33
-"""A picture that came as JPEG has more than this against its own source."""
+pytest_plugins = ("browser_fixtures",)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 
 LOOK_KEYS = {
     "d": "disparity",
@@ -59,85 +42,6 @@ LOOK_KEYS = {
     "n": "mosaic",
     "v": "picture",
 }
-
-
-@pytest.fixture(scope="module")
-def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_original(tmp_path_factory.mktemp("browser") / "original")
-
-
-@pytest.fixture(scope="module")
-def file(original: Path) -> Path:
-    return encode(original, original.parent / "room.mcap")
-
-
-@pytest.fixture(scope="module")
-def server(file: Path, original: Path) -> Iterator[Running]:
-    with playing(file, "--original", original) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=list(ARGUMENTS))
-        yield found
-        found.close()
-
-
-@pytest.fixture
-def page(browser: Browser) -> Iterator[Page]:
-    """A page whose errors fail the test, and whose requests must stay on this machine."""
-    page = browser.new_page(viewport={"width": 1280, "height": 720})
-    troubles: list[str] = []
-    page.on("pageerror", lambda error: troubles.append(str(error)))
-    page.on("request", lambda request: troubles.append(request.url) if is_foreign(request.url) else None)
-    yield page
-    page.close()
-    assert troubles == []
-
-
-def is_foreign(url: str) -> bool:
-    return not url.startswith(("http://127.0.0.1:", "ws://127.0.0.1:", "blob:http://127.0.0.1:"))
-
-
-def show(page: Page, server: Running, link: str = "") -> None:
-    page.goto(server.url + link)
-    page.wait_for_selector("body[data-frame]")
-
-
-def shows(page: Page, **facts: object) -> None:
-    """Wait until the picture on the screen is one with these facts (frame, row, col, look)."""
-    page.wait_for_selector("body" + "".join(f"[data-{name}='{value}']" for name, value in facts.items()))
-
-
-def pixels(page: Page) -> Picture:
-    """What is on the canvas, in the file's own pixels."""
-    url = page.evaluate("document.querySelector('canvas').toDataURL('image/png')")
-    return decode_picture(np.frombuffer(base64.b64decode(url.split(",")[1]), np.uint8))
-
-
-def rendered(file: Path, frame: int, row: float, col: float) -> Picture:
-    """The same by the library."""
-    with Decoder.open(file, slice(frame, frame + 1)) as decoder:
-        (decoded,) = decoder
-    return make_synthesizer(SYNTHESIZER).render(decoded, Viewpoint(row, col)).pixels
-
-
-def box_of(page: Page, selector: str) -> FloatRect:
-    box = page.locator(selector).bounding_box()
-    assert box is not None, f"{selector} is not visible"
-    return box
-
-
-def on_screen(page: Page) -> tuple[int, float, float]:
-    facts = page.evaluate("({...document.body.dataset})")
-    return int(facts["frame"]), float(facts["row"]), float(facts["col"])
-
-
-def screenshot(page: Page, name: str) -> None:
-    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=SCREENSHOTS / f"{name}.png")
 
 
 def test_loads_and_shows_the_middle(page: Page, server: Running, file: Path) -> None:
@@ -205,13 +109,15 @@ def test_dragging_shows_what_the_library_renders_there(page: Page, server: Runni
     assert there > max(SAME_DB, psnr(rendered(file, 0, 1, 1), pixels(page)))
 
 
-def settle(page: Page) -> tuple[int, float, float]:
-    """What is on the screen once it has stopped changing."""
-    last = None
-    while last != (last := on_screen(page)):
-        page.wait_for_timeout(300)
-    shows(page, scale=1)
-    return last
+def test_a_finger_drags_as_the_mouse_does(page: Page, server: Running) -> None:
+    show(page, server)
+    finger = page.context.new_cdp_session(page)
+    for kind, x in (("touchStart", 640), ("touchMove", 600), ("touchMove", 500)):
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": 300}]})
+    finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    frame, row, col = settle(page)
+    assert (frame, row) == (0, 1.0)
+    assert col == pytest.approx(1 + 140 / 1080 * 2, abs=1e-6)
 
 
 def test_moves_by_keys_and_on_the_map(page: Page, server: Running) -> None:
@@ -259,23 +165,6 @@ def test_measures_against_the_original(page: Page, server: Running) -> None:
     page.wait_for_selector("#quality:has-text('no original')")
 
 
-def test_help_and_hidden_controls(page: Page, server: Running) -> None:
-    show(page, server)
-    page.keyboard.press("?")
-    page.wait_for_selector("#help[open]")
-    for text in ("one frame on", "disparity", "full screen", "nine views"):
-        assert text in page.inner_text("#help")
-    screenshot(page, "help")
-    page.keyboard.press("Escape")
-    page.wait_for_selector("#help:not([open])", state="attached")
-    page.keyboard.press("h")
-    assert not page.is_visible("#controls")
-    assert page.is_visible("#readout")
-    page.keyboard.press("h")
-    page.keyboard.press("f")
-    page.wait_for_selector("#fullscreen[aria-pressed=true]")
-
-
 def test_a_link_shows_the_same_picture(page: Page, browser: Browser, server: Running) -> None:
     show(page, server, "#frame=7&view=0.5,1.25&look=anaglyph&eyes=0.3")
     assert on_screen(page) == (7, 0.5, 1.25)
@@ -291,68 +180,3 @@ def test_a_link_shows_the_same_picture(page: Page, browser: Browser, server: Run
     other.close()
     page.goto(server.url + "#frame=2&view=2,0")
     shows(page, frame=2, row=2, col=0, look="picture")
-
-
-def test_damage_is_told_and_playback_goes_on(page: Page, file: Path, tmp_path: Path) -> None:
-    with playing(damage(file, tmp_path / "damaged.mcap", gop=1)) as running:
-        show(page, running, f"#frame={GOP}")
-        page.wait_for_selector("#notice:has-text('cannot be decoded')")
-        assert "until" in page.inner_text("#notice")
-        screenshot(page, "damage")
-        page.click("#notice-close")
-        page.keyboard.press(" ")
-        shows(page, frame=FRAMES - 1)
-
-
-def test_the_server_goes_and_comes_back(page: Page, file: Path) -> None:
-    with playing(file) as running:
-        show(page, running, "#frame=3&view=0,0.5")
-        port = running.port
-    page.wait_for_selector("#connection:has-text('gone')")
-    screenshot(page, "server-gone")
-    page.keyboard.press("Shift+ArrowDown")
-    with playing(file, port=port):
-        page.wait_for_selector("#connection", state="hidden")
-        shows(page, frame=3, row=1, col=0.5)
-
-
-def test_two_viewers_watch_their_own_pictures(
-    page: Page, browser: Browser, server: Running, file: Path
-) -> None:
-    show(page, server, "#frame=2&view=0,0")
-    other = browser.new_page(viewport={"width": 1280, "height": 720})
-    show(other, server, "#frame=9&view=2,1.5")
-    other.keyboard.press(",")
-    shows(other, frame=8)
-    page.keyboard.press(".")
-    shows(page, frame=3)
-    assert on_screen(other) == (8, 2.0, 1.5)
-    assert psnr(rendered(file, 8, 2, 1.5), pixels(other)) > SAME_DB
-    assert psnr(rendered(file, 3, 0, 0), pixels(page)) > SAME_DB
-    other.close()
-
-
-@pytest.mark.parametrize(("width", "height"), [(320, 568), (390, 844), (844, 390)])
-def test_fits_a_phone(page: Page, server: Running, width: int, height: int) -> None:
-    page.set_viewport_size({"width": width, "height": height})
-    show(page, server, "#look=anaglyph")
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    for name in ("#readout", "#play", "#timeline", "#look", "#eyes", "#map", "#open-help"):
-        box = box_of(page, name)
-        assert box["x"] >= 0, name
-        assert box["x"] + box["width"] <= width, name
-        assert box["y"] + box["height"] <= height, name
-    screenshot(page, f"phone-{width}x{height}")
-
-
-def test_controls_are_labelled_and_show_the_focus(page: Page, server: Running) -> None:
-    show(page, server)
-    controls = page.locator("button:visible, select:visible, input:visible, #map, #stage")
-    for number in range(controls.count()):
-        control = controls.nth(number)
-        name = control.evaluate("e => e.ariaLabel || e.innerText || (e.labels && e.labels[0]?.innerText)")
-        assert name, control.evaluate("e => e.outerHTML")
-    for _ in range(4):
-        page.keyboard.press("Tab")
-        outline = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
-        assert outline == "solid"

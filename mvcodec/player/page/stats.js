@@ -2,6 +2,10 @@
 
 const WINDOW_MS = 1000;
 const LAST = 8;
+const DIGITS = 3;
+
+// Numbers keep their width, so that the line stands still while they change.
+const padded = (text) => text.padStart(DIGITS, "\u2007");
 
 export class Stats {
   constructor(element) {
@@ -29,10 +33,10 @@ export class Stats {
     if (!this.facts) return;
     const ms = (name) => {
       const values = this.recent.map((facts) => facts[name]).filter((value) => typeof value === "number");
-      return values.length ? Math.round(values.reduce((sum, value) => sum + value, 0) / values.length) : "–";
+      return padded(values.length ? String(Math.round(values.reduce((sum, value) => sum + value, 0) / values.length)) : "–");
     };
     const parts = [
-      `${this.fps} fps`,
+      `${this.fps} fps`.padEnd(6, "\u2007"),
       `decode ${ms("decode_ms")} ms`,
       `synthesis ${ms("synthesis_ms")} ms`,
       `encode ${ms("encode_ms")} ms`,

@@ -1,0 +1,79 @@
+"""The player's page in a real Chromium: where it is, how to wait for it, and what is on its screen."""
+
+from __future__ import annotations
+
+import base64
+import shutil
+from pathlib import Path
+
+import numpy as np
+from player_files import SYNTHESIZER, Running, decode_picture
+from playwright.sync_api import FloatRect, Page
+
+from mvcodec.array import Viewpoint
+from mvcodec.decoder import Decoder
+from mvcodec.frames import Picture
+from mvcodec.synthesis.table import make_synthesizer
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+NO_CHROMIUM = "no Chromium (Debian: apt install chromium)"
+ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+SCREENSHOTS = Path(__file__).parents[1] / "build" / "screenshots"
+SAME_DB = 33
+"""A picture that came as JPEG has more than this against its own source."""
+
+
+def show(page: Page, server: Running, link: str = "") -> None:
+    page.goto(server.url + link)
+    page.wait_for_selector("body[data-frame]")
+
+
+def shows(page: Page, **facts: object) -> None:
+    """Wait until the picture on the screen is one with these facts (frame, row, col, look)."""
+    page.wait_for_selector("body" + "".join(f"[data-{name}='{value}']" for name, value in facts.items()))
+
+
+def pixels(page: Page) -> Picture:
+    """What is on the canvas, in the file's own pixels."""
+    url = page.evaluate("document.querySelector('canvas').toDataURL('image/png')")
+    return decode_picture(np.frombuffer(base64.b64decode(url.split(",")[1]), np.uint8))
+
+
+def rendered(file: Path, frame: int, row: float, col: float) -> Picture:
+    """The same by the library."""
+    with Decoder.open(file, slice(frame, frame + 1)) as decoder:
+        (decoded,) = decoder
+    return make_synthesizer(SYNTHESIZER).render(decoded, Viewpoint(row, col)).pixels
+
+
+def box_of(page: Page, selector: str) -> FloatRect:
+    box = page.locator(selector).bounding_box()
+    assert box is not None, f"{selector} is not visible"
+    return box
+
+
+def on_screen(page: Page) -> tuple[int, float, float]:
+    facts = page.evaluate("({...document.body.dataset})")
+    return int(facts["frame"]), float(facts["row"]), float(facts["col"])
+
+
+def screenshot(page: Page, name: str) -> None:
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=SCREENSHOTS / f"{name}.png")
+
+
+def settle(page: Page) -> tuple[int, float, float]:
+    """What is on the screen once it has stopped changing."""
+    last = None
+    while last != (last := on_screen(page)):
+        page.wait_for_timeout(300)
+    shows(page, scale=1)
+    return last

@@ -1,0 +1,114 @@
+"""The page around the picture in a real Chromium: help, damage, a lost server, phones, labels, two viewers.
+
+Skips where there is no Chromium (Debian: apt install chromium).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from browser_page import (
+    CHROMIUM,
+    NO_CHROMIUM,
+    SAME_DB,
+    box_of,
+    on_screen,
+    pixels,
+    rendered,
+    screenshot,
+    show,
+    shows,
+)
+from player_files import FRAMES, GOP, Running, damage, playing
+from playwright.sync_api import Browser, Page
+
+from mvcodec.evaluation.metrics import psnr
+
+pytest_plugins = ("browser_fixtures",)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
+
+
+def test_help_and_hidden_controls(page: Page, server: Running) -> None:
+    show(page, server)
+    page.keyboard.press("?")
+    page.wait_for_selector("#help[open]")
+    for text in ("one frame on", "disparity", "full screen", "nine views"):
+        assert text in page.inner_text("#help")
+    screenshot(page, "help")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("#help:not([open])", state="attached")
+    page.keyboard.press("h")
+    assert not page.is_visible("#controls")
+    assert page.is_visible("#readout")
+    page.keyboard.press("h")
+    page.keyboard.press("f")
+    page.wait_for_selector("#fullscreen[aria-pressed=true]")
+
+
+def test_damage_is_told_and_playback_goes_on(page: Page, file: Path, tmp_path: Path) -> None:
+    with playing(damage(file, tmp_path / "damaged.mcap", gop=1)) as running:
+        show(page, running, f"#frame={GOP}")
+        page.wait_for_selector("#notice:has-text('cannot be decoded')")
+        assert "until" in page.inner_text("#notice")
+        screenshot(page, "damage")
+        page.click("#notice-close")
+        page.keyboard.press(" ")
+        shows(page, frame=FRAMES - 1)
+
+
+def test_the_server_goes_and_comes_back(page: Page, file: Path) -> None:
+    with playing(file) as running:
+        show(page, running, "#frame=3&view=0,0.5")
+        port = running.port
+    page.wait_for_selector("#connection:has-text('gone')")
+    screenshot(page, "server-gone")
+    page.keyboard.press("Shift+ArrowDown")
+    with playing(file, port=port):
+        page.wait_for_selector("#connection", state="hidden")
+        shows(page, frame=3, row=1, col=0.5)
+
+
+def test_two_viewers_watch_their_own_pictures(
+    page: Page, browser: Browser, server: Running, file: Path
+) -> None:
+    show(page, server, "#frame=2&view=0,0")
+    other = browser.new_page(viewport={"width": 1280, "height": 720})
+    show(other, server, "#frame=9&view=2,1.5")
+    other.keyboard.press(",")
+    shows(other, frame=8)
+    page.keyboard.press(".")
+    shows(page, frame=3)
+    assert on_screen(other) == (8, 2.0, 1.5)
+    assert psnr(rendered(file, 8, 2, 1.5), pixels(other)) > SAME_DB
+    assert psnr(rendered(file, 3, 0, 0), pixels(page)) > SAME_DB
+    other.close()
+
+
+@pytest.mark.parametrize(("width", "height"), [(320, 568), (390, 844), (844, 390)])
+def test_fits_a_phone(page: Page, server: Running, width: int, height: int) -> None:
+    page.set_viewport_size({"width": width, "height": height})
+    show(page, server, "#look=anaglyph")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for name in ("#readout", "#play", "#timeline", "#look", "#eyes", "#map", "#open-help"):
+        box = box_of(page, name)
+        assert box["x"] >= 0, name
+        assert box["x"] + box["width"] <= width, name
+        assert box["y"] + box["height"] <= height, name
+    screenshot(page, f"phone-{width}x{height}")
+    page.click("#open-help")
+    assert page.evaluate("document.getElementById('help').scrollTop") == 0
+    assert box_of(page, "#help button")["y"] + box_of(page, "#help button")["height"] <= height
+
+
+def test_controls_are_labelled_and_show_the_focus(page: Page, server: Running) -> None:
+    show(page, server)
+    controls = page.locator("button:visible, select:visible, input:visible, #map, #stage")
+    for number in range(controls.count()):
+        control = controls.nth(number)
+        name = control.evaluate("e => e.ariaLabel || e.innerText || (e.labels && e.labels[0]?.innerText)")
+        assert name, control.evaluate("e => e.outerHTML")
+    for _ in range(4):
+        page.keyboard.press("Tab")
+        outline = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+        assert outline == "solid"
