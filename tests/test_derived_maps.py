@@ -19,7 +19,7 @@ from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecWarning, SettingError, StreamError
 from mvcodec.evaluation.validation import validate
 from mvcodec.frames import DecodedSet, DisparityMap, FloatMap
-from mvcodec.kernels.map_projection import project
+from mvcodec.kernels.map_projection import merge, project
 from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, map_cameras
 from mvcodec.synthesis.derived_maps import derive_map
 
@@ -52,6 +52,22 @@ def test_the_kernel_is_its_twin(seed: int, shape: tuple[int, int], step: tuple[f
     found = np.full(shape, -np.inf, np.float32)
     project(values, *step, found)
     np.testing.assert_array_equal(found, plain_project(values, *step))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 4))
+def test_the_merging_kernel_is_its_twin(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    # Eighths of a pixel: sums are exact.
+    seen = (rng.integers(-40, 41, (count, 5, 7)) / 8).astype(np.float32)
+    seen[rng.random(seen.shape) < 0.3] = -np.inf
+    values, known = np.empty((5, 7), np.float32), np.empty((5, 7), np.bool_)
+    merge(seen, 2.0, values, known)
+    np.testing.assert_array_equal(known, np.isfinite(seen).any(axis=0))
+    for place in np.ndindex(5, 7):
+        of_pixel = seen[(slice(None), *place)]
+        agreeing = of_pixel[of_pixel > of_pixel.max() - 2] if known[place] else of_pixel[:1]
+        assert values[place] == pytest.approx(agreeing.mean())
 
 
 def square(array: CameraArray, camera: Position) -> FloatMap:
