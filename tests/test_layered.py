@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -163,15 +164,20 @@ def test_a_camera_that_is_wrong_alone_is_outvoted() -> None:
         assert (view.seen_by[shared] == 3).sum() > 500
 
 
-def test_two_cameras_that_agree_on_something_near_are_believed() -> None:
-    """Against two others of the same weight: the nearer surface hides what the others see behind it."""
+def test_two_cameras_that_agree_on_something_near_are_believed_unless_two_see_through_it() -> None:
+    """Against two others of the same weight, whose pictures decide."""
     scene = PlaneScene(grid(2, 2, 80, 60), 4)
     decoded = scene.decoded()
     values = {camera: decoded.disparities[camera].values_px.copy() for camera in ((0, 0), (0, 1))}
     for camera, left in (((0, 0), 30), ((0, 1), 18)):
         values[camera][26:46, left : left + 20] = 12
-    view = render(with_disparities(decoded, values), 0.5, 0.5)
-    np.testing.assert_allclose(view.disparity_px[21:39, 25:43], 12, atol=1e-4)
+    for grey_of_the_others, expected in ((90, 12), (120, 4)):
+        pictures = {
+            camera: np.full((60, 80, 3), 90 if camera in values else grey_of_the_others, np.uint8)
+            for camera in decoded.pictures
+        }
+        view = render(replace(with_disparities(decoded, values), pictures=pictures), 0.5, 0.5)
+        np.testing.assert_allclose(view.disparity_px[21:39, 25:43], expected, atol=1e-4)
 
 
 def test_seen_by_counts_the_cameras_that_see_the_point() -> None:

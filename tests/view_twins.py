@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from mvcodec.synthesis.camera_spread import measure_spread
 from mvcodec.synthesis.layered import FADE, LayeredSettings
 
 UNKNOWN = -1e9
+BORDER = 2
 LUMA = np.array([0.299, 0.587, 0.114])
 
 
@@ -31,34 +33,82 @@ def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float) -> 
     return out
 
 
-def outvote(seen: Sequence[tuple[float, float]], tolerance: float, ratio: float) -> float:
-    """The winner among (disparity, weight), UNKNOWN among none."""
-    surfaces: list[list[tuple[float, float]]] = []
-    for d, weight in sorted(seen, reverse=True):
-        if surfaces and surfaces[-1][0][0] - d <= tolerance:
-            surfaces[-1].append((d, weight))
+class Ballot(NamedTuple):
+    """Who votes: maps, luma with its border, shifts (x, y) from the view for a px of disparity, weights."""
+
+    maps: NDArray[np.float32]
+    lumas: NDArray[np.float32]
+    shifts: NDArray[np.float32]
+    weights: NDArray[np.float32]
+
+
+class Limits(NamedTuple):
+    """Of the vote, as in `LayeredSettings`."""
+
+    tolerance: float
+    contrast: float
+    ratio: float
+    denial: float
+
+
+def outvote(place: tuple[int, int], said: Mapping[int, float], ballot: Ballot, limits: Limits) -> float:
+    """The winner among the disparities that cameras say of (y, x), UNKNOWN among none."""
+    surfaces: list[list[int]] = []
+    for camera in sorted(said, key=lambda camera: -said[camera]):
+        if surfaces and said[surfaces[-1][0]] - said[camera] <= limits.tolerance:
+            surfaces[-1].append(camera)
         else:
-            surfaces.append([(d, weight)])
-    best, best_weight = UNKNOWN, 0.0
+            surfaces.append([camera])
+    best, strength = UNKNOWN, 0.0
     for surface in surfaces:
-        total = sum(weight for _, weight in surface)
-        if surface is surfaces[0] or total > ratio * best_weight:
-            best, best_weight = sum(d * weight for d, weight in surface) / total, total
+        weights = [float(ballot.weights[camera]) for camera in surface]
+        if surface is surfaces[0] or sum(weights) > limits.ratio * strength:
+            best = float(np.average([said[camera] for camera in surface], weights=weights))
+            seen = [luma_around(place, best, ballot, camera)[1, 1] for camera in surface]
+            luma = float(np.average(seen, weights=weights))
+            against = sum(
+                float(weight)
+                for camera, weight in enumerate(ballot.weights)
+                if camera not in surface and denies(place, best, luma, ballot, camera, limits)
+            )
+            strength = max(sum(weights) - limits.denial * against, 0)
     return best
 
 
-def vote(
-    moved: NDArray[np.float32], weights: NDArray[np.float32], tolerance: float, ratio: float
-) -> FloatMap:
+def pixel(place: tuple[int, int], d: float, shift: NDArray[np.float32]) -> tuple[int, int]:
+    """(row, column) of a camera's pixel nearest to where the view's point (y, x) at d would stand."""
+    row, column = (np.floor(p + s * d + 0.5) for p, s in zip(place, shift[::-1], strict=True))
+    return int(row), int(column)
+
+
+def luma_around(place: tuple[int, int], d: float, ballot: Ballot, camera: int) -> NDArray[np.float32]:
+    """3 x 3 around that pixel, or the nearest one of the picture."""
+    size = ballot.maps.shape[1:]
+    row, column = (
+        min(max(p, 0), s - 1) for p, s in zip(pixel(place, d, ballot.shifts[camera]), size, strict=True)
+    )
+    return ballot.lumas[camera, row + 1 : row + 4, column + 1 : column + 4]
+
+
+def denies(
+    place: tuple[int, int], d: float, luma: float, ballot: Ballot, camera: int, limits: Limits
+) -> bool:
+    """Whether the camera sees something farther, of another luma, in place of the view's point (y, x)."""
+    row, column = pixel(place, d, ballot.shifts[camera])
+    height, width = ballot.maps.shape[1:]
+    if not (0 <= row < height and 0 <= column < width):
+        return False
+    around = luma_around(place, d, ballot, camera)
+    farther = ballot.maps[camera, row, column] < d - limits.tolerance
+    return bool(farther and (np.abs(around - luma) > limits.contrast).all())
+
+
+def vote(moved: NDArray[np.float32], ballot: Ballot, limits: Limits) -> FloatMap:
     inner = moved[:, 1:-1, 1:-1]
     out = np.empty(inner.shape[1:], np.float32)
     for y, x in np.ndindex(*out.shape):
-        seen = [
-            (float(d), float(w))
-            for d, w in zip(inner[:, y, x], weights, strict=True)
-            if d > np.float32(UNKNOWN)
-        ]
-        out[y, x] = outvote(seen, tolerance, ratio)
+        said = {i: float(d) for i, d in enumerate(inner[:, y, x]) if d > np.float32(UNKNOWN)}
+        out[y, x] = outvote((y, x), said, ballot, limits)
     return out
 
 
@@ -254,8 +304,14 @@ def render(
             disparity = decoded.disparities[camera].values_px
             sources.append(Source(decoded.pictures[camera], disparity, shift, weight))
     moved = np.stack([splat(source.disparity, *source.shift, settings.reach_px) for source in sources])
-    weights = np.array([source.weight for source in sources], np.float32)
-    voted = median3(vote(moved, weights, settings.tolerance_px, settings.ratio))
+    ballot = Ballot(
+        np.stack([source.disparity for source in sources]),
+        np.stack([split_luma(source.picture, BORDER)[0] for source in sources]).astype(np.float32),
+        np.array([source.shift for source in sources], np.float32),
+        np.array([source.weight for source in sources], np.float32),
+    )
+    limits = Limits(settings.tolerance_px, settings.contrast, settings.ratio, settings.denial)
+    voted = median3(vote(moved, ballot, limits))
     disparity = fill_background(voted, decoded.disparity_range_px[0])
     colours, seen_by = blend(sources, disparity, settings)
     rounded = np.floor(colours + 0.5).astype(np.uint8)

@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvcodec.kernels.view_fetch import BORDER
+
 FloatMap = NDArray[np.float32]
 
 UNKNOWN = np.float32(-1e9)
@@ -61,21 +63,72 @@ def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out
                     flat[place] = max(flat[place], d)
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _pixel(x, y, d, shift):  # type: ignore[no-untyped-def]
+    """(column, row) of a camera's pixel nearest to where the view's point (x, y) at d would stand."""
+    at_x = np.float32(x) + shift[0] * d + np.float32(0.5)
+    at_y = np.float32(y) + shift[1] * d + np.float32(0.5)
+    return int(np.floor(at_x)), int(np.floor(at_y))
+
+
 @njit(cache=True, nogil=True)
-def _outvote(near, weight, known, tolerance, ratio):  # type: ignore[no-untyped-def]
+def _denies(x, y, d, luma, camera, maps, lumas, shift, limits):  # type: ignore[no-untyped-def]
+    """Whether a camera sees through the view's point (x, y) at d: something farther, of another luma."""
+    height, width = maps.shape[1:]
+    column, row = _pixel(x, y, d, shift)
+    if not (0 <= column < width and 0 <= row < height):
+        return False
+    tolerance, contrast = limits
+    if maps[camera, row, column] >= d - tolerance:
+        return False
+    for v in range(row + BORDER - 1, row + BORDER + 2):
+        for u in range(column + BORDER - 1, column + BORDER + 2):
+            if abs(lumas[camera, v, u] - luma) <= contrast:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _luma_of(x, y, d, who, cameras, lumas, shifts, weights):  # type: ignore[no-untyped-def]
+    """Mean luma that the cameras `who` have for the view's point (x, y) at d."""
+    height, width = lumas.shape[1] - 2 * BORDER, lumas.shape[2] - 2 * BORDER
+    mean = total = np.float32(0)
+    for i in who:
+        column, row = _pixel(x, y, d, shifts[i])
+        column, row = min(max(column, 0), width - 1), min(max(row, 0), height - 1)
+        mean += weights[i] * lumas[cameras[i], row + BORDER, column + BORDER]
+        total += weights[i]
+    return mean / total
+
+
+@njit(cache=True, nogil=True)
+def _outvote(  # type: ignore[no-untyped-def]
+    x, y, near, who, known, cameras, maps, lumas, shifts, weights, limits, ratio, denial
+):
     """The winner among `known` disparities, sorted near to far; see `vote`."""
-    best, best_weight = UNKNOWN, np.float32(0)
+    best, strength = UNKNOWN, np.float32(0)
     start = 0
     while start < known:
         end = start
         total = np.float32(0)
         mean = np.float32(0)
-        while end < known and near[start] - near[end] <= tolerance:
-            total += weight[end]
-            mean += weight[end] * near[end]
+        while end < known and near[start] - near[end] <= limits[0]:
+            total += weights[who[end]]
+            mean += weights[who[end]] * near[end]
             end += 1
-        if start == 0 or total > ratio * best_weight:
-            best, best_weight = mean / total, total
+        mean /= total
+        if end - start == known:
+            return mean
+        if start == 0 or total > ratio * strength:
+            luma = _luma_of(x, y, mean, who[start:end], cameras, lumas, shifts, weights)
+            against = np.float32(0)
+            for i in range(cameras.size):
+                agrees = False
+                for k in range(start, end):
+                    agrees |= who[k] == i
+                if not agrees and _denies(x, y, mean, luma, cameras[i], maps, lumas, shifts[i], limits):
+                    against += weights[i]
+            best, strength = mean, max(total - denial * against, np.float32(0))
         start = end
     return best
 
@@ -83,9 +136,15 @@ def _outvote(near, weight, known, tolerance, ratio):  # type: ignore[no-untyped-
 @njit(cache=True, nogil=True)
 def vote(
     moved: NDArray[np.float32],
+    cameras: NDArray[np.int64],
+    maps: NDArray[np.float32],
+    lumas: NDArray[np.float32],
+    shifts: NDArray[np.float32],
     weights: NDArray[np.float32],
     tolerance: float,
+    contrast: float,
     ratio: float,
+    denial: float,
     out: FloatMap,
     first: int,
     last: int,
@@ -93,18 +152,25 @@ def vote(
     """One disparity for each pixel from the cameras' moved maps, rows first..last-1.
 
     Disparities within `tolerance` px of the nearest one of their group are one surface. Surfaces are
-    tried near to far; a farther one wins when its cameras weigh more than `ratio` times those of the
-    winner so far, so that a wrong near disparity is outvoted.
+    tried near to far; a farther one wins when its cameras weigh more than `ratio` times the winner so
+    far: the cameras that say that one, less `denial` times those that deny it, because they see
+    something farther in its place, and nothing within `contrast` of its luma in the 3 x 3 window
+    there. So a wrong near disparity is outvoted, while one that is hidden from the others holds.
 
     Args:
         moved: float32 (N, H + 2, W + 2), px, or UNKNOWN; see `splat`.
+        cameras: int64 (N,), which of the R real cameras were moved.
+        maps: float32 (R, H, W), px, of every real camera.
+        lumas: float32 (R, H + 4, W + 4), grey levels, see `mvcodec.kernels.view_fetch`.
+        shifts: float32 (N, 2), px (x, y) from the view to the camera for each px of disparity.
         weights: float32 (N,), of the cameras, above 0.
         out: float32 (H, W), rows first..last-1 overwritten; UNKNOWN where no camera knows.
     """
     count, width = moved.shape[0], out.shape[1]
     near = np.empty(count, np.float32)
-    weight = np.empty(count, np.float32)
-    near_px, least = np.float32(tolerance), np.float32(ratio)
+    who = np.empty(count, np.int64)
+    near_px, least, share = np.float32(tolerance), np.float32(ratio), np.float32(denial)
+    limits = near_px, np.float32(contrast)
     nearest = np.empty(width, np.float32)
     farthest = np.empty(width, np.float32)
     everyone = np.float32(0)
@@ -116,9 +182,9 @@ def vote(
         nearest[:] = UNKNOWN
         farthest[:] = -UNKNOWN
         for i in range(count):
-            row, share = moved[i, y + 1, 1:-1], weights[i] / everyone
+            row, part = moved[i, y + 1, 1:-1], weights[i] / everyone
             for x in range(width):
-                mean[x] += share * row[x]
+                mean[x] += part * row[x]
                 nearest[x] = max(nearest[x], row[x])
                 farthest[x] = min(farthest[x], row[x])
         for x in range(width):
@@ -131,12 +197,14 @@ def vote(
                     place = known
                     while place > 0 and near[place - 1] < d:
                         near[place] = near[place - 1]
-                        weight[place] = weight[place - 1]
+                        who[place] = who[place - 1]
                         place -= 1
                     near[place] = d
-                    weight[place] = weights[i]
+                    who[place] = i
                     known += 1
-            mean[x] = _outvote(near, weight, known, near_px, least)
+            mean[x] = _outvote(
+                x, y, near, who, known, cameras, maps, lumas, shifts, weights, limits, least, share
+            )
 
 
 @njit(cache=True, nogil=True)

@@ -37,6 +37,9 @@ class LayeredSettings:
         tolerance_px: disparities this close are one surface, px, above 0.
         ratio: cameras behind a farther surface must weigh this many times those of a nearer one to
             outvote it, at least 1.
+        contrast: grey levels; a camera that sees something farther denies a nearer surface when its
+            picture differs by more than this, 0..255.
+        denial: how much such a camera counts against that surface, as a share of its weight, 0..10.
         reach_px: how far a moved pixel covers its surroundings, px, 0.5..1.
         spread: squared cells; a camera at distance b counts 1 / (spread + b^2), so that more cameras are
             averaged (less noise, more blur) with a larger one, above 0. None: as the pictures ask for,
@@ -51,6 +54,8 @@ class LayeredSettings:
 
     tolerance_px: float = 1.5
     ratio: float = 1.3
+    contrast: float = 10.0
+    denial: float = 0.6
     reach_px: float = 0.58
     spread: float | None = None
     edge_trust: float = 0.5
@@ -61,6 +66,8 @@ class LayeredSettings:
         for name, low, high in (
             ("tolerance_px", 1e-3, 1e3),
             ("ratio", 1.0, 1e3),
+            ("contrast", 0.0, 255.0),
+            ("denial", 0.0, 10.0),
             ("reach_px", 0.5, 1.0),
             ("spread", 1e-3, 1e3),
             ("edge_trust", 1e-3, 1.0),
@@ -156,13 +163,27 @@ class Layered:
 
     def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
         """See `Synthesizer.render`. `seen_by` counts the cameras that agree on the pixel's surface."""
-        array = decoded.array
-        cell = array.cell_at(viewpoint)
+        decoded.array.cell_at(viewpoint)  # outside the array it raises
         position = viewpoint.position
         if position is not None and position in decoded.pictures:
             pixels = decoded.pictures[position]
             own = decoded.disparities[position].values_px
             return RenderedView(viewpoint, pixels.copy(), own.copy(), np.ones(own.shape, np.uint8))
+        sources, places, shifts, weight = self._cameras(decoded, viewpoint)
+        disparity = self._view_disparity(sources, places, shifts, weight)
+        pixels, seen_by = self._colour(sources, places, shifts, weight, disparity)
+        return RenderedView(viewpoint, pixels, disparity, seen_by)
+
+    def prepare(self, decoded: DecodedSet, viewpoint: Viewpoint) -> None:
+        """See `Preparing.prepare`."""
+        self._cameras(decoded, viewpoint)
+
+    def _cameras(
+        self, decoded: DecodedSet, viewpoint: Viewpoint
+    ) -> tuple[_Sources, NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
+        """The cameras that see a view, prepared: their places in the sources, shifts and weights."""
+        array = decoded.array
+        cell = array.cell_at(viewpoint)
         sources = self._prepared(decoded)
         weights = {camera: _weight(array, cell, camera, viewpoint, sources.spread) for camera in cell.cameras}
         cameras = [camera for camera in cell.cameras if weights[camera] > 0 and camera in decoded.pictures]
@@ -171,9 +192,7 @@ class Layered:
         shifts = np.array([array.shift_per_disparity(camera, viewpoint) for camera in cameras], np.float32)
         weight = np.array([weights[camera] for camera in cameras], np.float32)
         places = sources.indices(cameras, self.settings.tolerance_px, self._pool)
-        disparity = self._view_disparity(sources, places, shifts, weight)
-        pixels, seen_by = self._colour(sources, places, shifts, weight, disparity)
-        return RenderedView(viewpoint, pixels, disparity, seen_by)
+        return sources, places, shifts, weight
 
     def _prepared(self, decoded: DecodedSet) -> _Sources:
         with self._lock:
@@ -202,7 +221,21 @@ class Layered:
         for job in jobs:
             job.result()
         voted = np.empty((height, width), np.float32)
-        self._bands(height, view_depth.vote, moved, weights, settings.tolerance_px, settings.ratio, voted)
+        self._bands(
+            height,
+            view_depth.vote,
+            moved,
+            places,
+            sources.disparities,
+            sources.lumas,
+            shifts,
+            weights,
+            settings.tolerance_px,
+            settings.contrast,
+            settings.ratio,
+            settings.denial,
+            voted,
+        )
         cleaned = np.asarray(cv2.medianBlur(voted, 3), np.float32)
         self._bands(height, view_depth.fill_background, cleaned, sources.decoded.disparity_range_px[0])
         return cleaned
