@@ -10,7 +10,6 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -141,7 +140,7 @@ def test_a_late_joiner_gets_the_rig_at_once_and_pictures_from_the_next_keyframe(
             late.wait_for_channels(CHANNELS)
             late.subscribe([*VIDEO, "/tf", "/camera/r00_c01/calibration", HEADER])
             running.give(2)
-            early = list(islice(late.messages(), 5))
+            early = _take(late, VIDEO[0], frame_set(ARRAY, 3).time_ns)
             running.give(GOP)
             later = _take(late, VIDEO[0], frame_set(ARRAY, GOP + 3).time_ns)
         running.end()
