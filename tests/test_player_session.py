@@ -118,6 +118,19 @@ def test_a_late_picture_drops_frames() -> None:
     assert session.dropped == 1
 
 
+def test_the_next_frame_is_expected_as_far_on_as_the_last_one_came() -> None:
+    session = ready(Play(True))
+    request(session, 0.0)
+    assert session.next_frame() == 1
+    request(session, 0.2)
+    assert session.next_frame() == 4
+    session.apply(Seek(COUNT - 2), 0.2)
+    request(session, 0.2)
+    assert session.next_frame() == COUNT - 1
+    request(session, 0.3)
+    assert session.next_frame() is None
+
+
 def test_the_clock_waits_for_a_decoder_that_is_far_behind() -> None:
     clock = PlayClock(1000, FPS)
     clock.play(True, 0.0)

@@ -25,6 +25,7 @@ class PlayClock:
         self._frame = 0
         self._since_s: float | None = None
         self._dropped = 0
+        self._stride = 1
         self.loop = False
         self._speed = 1.0
 
@@ -60,12 +61,14 @@ class PlayClock:
     def set_speed(self, speed: float, now_s: float) -> None:
         """Change the speed from now on."""
         self._speed = speed
+        self._stride = 1
         if self.playing:
             self._since_s = now_s
 
     def seek(self, frame: int, now_s: float) -> None:
         """Go to a frame; the clock goes on from there if it runs."""
         self._frame = min(max(frame, 0), self._count - 1)
+        self._stride = 1
         if self.playing:
             self._since_s = now_s
 
@@ -78,6 +81,7 @@ class PlayClock:
         if due < 1:
             return self._frame
         steps = min(due, max(1, math.ceil(MAX_STALL_S * rate)))
+        self._stride = steps
         self._since_s = now_s if steps < due else self._since_s + due / rate
         last = self._count - 1
         if self._frame + steps > last and not self.loop:
@@ -88,10 +92,10 @@ class PlayClock:
         return self._frame
 
     def following(self, frame: int) -> int | None:
-        """The frame after one; None after the last, unless looping."""
-        if frame + 1 < self._count:
-            return frame + 1
-        return 0 if self.loop else None
+        """The frame that will be due after this one, if as many are dropped as last; None after the last."""
+        if self.loop:
+            return (frame + self._stride) % self._count
+        return min(frame + self._stride, self._count - 1) if frame + 1 < self._count else None
 
     def seconds_to_next(self, now_s: float) -> float | None:
         """How long until another frame is due; None while paused."""

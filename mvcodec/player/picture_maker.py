@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,12 @@ from mvcodec.array import Viewpoint
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.player.draft import in_full_px, shrink
-from mvcodec.player.frame_store import Damage, FrameStore, StoredFrame
+from mvcodec.player.frame_store import Damage, FrameStore
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.originals import Originals
 from mvcodec.player.session import PictureRequest
 from mvcodec.player.synthesizers import SynthesizerPool
-from mvcodec.synthesis.synthesizer import Synthesizer
+from mvcodec.synthesis.synthesizer import Preparing, Synthesizer
 
 WORKERS = 2
 JPEG_QUALITY = 90
@@ -60,27 +61,28 @@ class PictureMaker:
     def __init__(self, path: Path, make_synthesizer: Callable[[], Synthesizer]) -> None:
         self.store = FrameStore(path)
         self.originals: Originals | None = None
-        self._synthesizers = SynthesizerPool(make_synthesizer, WORKERS)
+        self._synthesizers = SynthesizerPool(make_synthesizer, WORKERS + 1)
         self._drafts = _Drafts()
-        self._ahead = ThreadPoolExecutor(1, "decode-ahead")
-        self._decoding: Future[StoredFrame] | None = None
+        self._ahead = ThreadPoolExecutor(1, "ahead")
+        self._coming: tuple[int, Future[None]] | None = None
 
     def make(self, request: PictureRequest, next_frame: int | None = None) -> MadePicture:
         """Decode, render, compose and code one picture.
 
         Args:
-            next_frame: decoded meanwhile, since it will be asked for next.
+            next_frame: decoded and prepared meanwhile, since it will be asked for next.
 
         Raises:
             StreamError: no frame of the file can be decoded.
             InputError: the original's picture cannot be read.
         """
+        self._wait_for(request.frame)
         stored = self.store.fetch(request.frame)
         if stored.decoded is None:
             found = stored.damage.message if stored.damage else "no frame"
             raise StreamError(self.store.path.name, found, "a frame that can be decoded")
         if next_frame is not None:
-            self._decode_ahead(next_frame)
+            self._begin(replace(request, frame=next_frame))
         start = time.perf_counter()
         decoded, look = self._drafts.of(stored.decoded, request.scale), LOOKS[request.look]
         viewpoints = look.place(decoded.array, request.viewpoint, request.eye_steps)
@@ -117,10 +119,26 @@ class PictureMaker:
         with self._synthesizers.borrow(decoded) as synthesizer:
             return [synthesizer.render(decoded, viewpoint) for viewpoint in viewpoints]
 
-    def _decode_ahead(self, frame: int) -> None:
+    def _begin(self, request: PictureRequest) -> None:
         # One at a time: with many viewers it is a help to none if it queues up.
-        if self._decoding is None or self._decoding.done():
-            self._decoding = self._ahead.submit(self.store.fetch, frame)
+        if self._coming is None or self._coming[1].done():
+            self._coming = request.frame, self._ahead.submit(self._prepare, request)
+
+    def _prepare(self, request: PictureRequest) -> None:
+        """Decode a frame set and prepare it for views from about the viewpoint."""
+        stored = self.store.fetch(request.frame)
+        if stored.decoded is None:
+            return
+        decoded = self._drafts.of(stored.decoded, request.scale)
+        with self._synthesizers.borrow(decoded) as synthesizer:
+            if isinstance(synthesizer, Preparing):
+                synthesizer.prepare(decoded, request.viewpoint)
+
+    def _wait_for(self, frame: int) -> None:
+        """Until the frame is prepared, if it is being prepared: else it would be done twice."""
+        coming = self._coming
+        if coming is not None and coming[0] == frame:
+            wait([coming[1]])
 
     def _measure(
         self, request: PictureRequest, decoded: DecodedSet, views: list[RenderedView]
@@ -144,16 +162,18 @@ class _Drafts:
     """The frame sets shrunk last; synthesizers know by identity what they have prepared."""
 
     def __init__(self) -> None:
-        self._held: deque[tuple[DecodedSet, float, DecodedSet]] = deque(maxlen=WORKERS + 1)
+        self._held: deque[tuple[DecodedSet, float, DecodedSet]] = deque(maxlen=WORKERS + 2)
+        self._lock = threading.Lock()
 
     def of(self, decoded: DecodedSet, scale: float) -> DecodedSet:
         if scale == 1:
             return decoded
-        for whole, held_scale, draft in list(self._held):
-            if whole is decoded and held_scale == scale:
-                return draft
-        draft = shrink(decoded, scale)
-        self._held.append((decoded, scale, draft))
+        with self._lock:
+            for whole, held_scale, draft in self._held:
+                if whole is decoded and held_scale == scale:
+                    return draft
+            draft = shrink(decoded, scale)
+            self._held.append((decoded, scale, draft))
         return draft
 
 

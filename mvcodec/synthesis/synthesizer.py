@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from mvcodec.array import Viewpoint
 from mvcodec.frames import DecodedSet, RenderedView
@@ -18,5 +18,18 @@ class Synthesizer(Protocol):
 
         Raises:
             SettingError: the viewpoint lies outside the span of the real cameras.
+        """
+        ...
+
+
+@runtime_checkable
+class Preparing(Protocol):
+    """A synthesizer that can be told which decoded set comes next."""
+
+    def prepare(self, decoded: DecodedSet, viewpoint: Viewpoint) -> None:
+        """Do beforehand what the first `render` of this set from about this viewpoint would begin with.
+
+        Raises:
+            SettingError: as `Synthesizer.render`.
         """
         ...
