@@ -232,6 +232,17 @@ class CameraArray:
         vertical = self.rho * calibration.fx_px / calibration.fy_px
         return col * calibration.baseline_m, row * vertical * calibration.baseline_m, 0.0
 
+    def principal_point_px(self, position: tuple[float, float]) -> tuple[float, float]:
+        """(x, y) of the optical axis in a view's picture; fractions are legal.
+
+        The calibration has view (0, 0)'s. Each step moves it by the disparity of infinity, which is
+        what that disparity comes from.
+        """
+        row, col = position
+        c = self.calibration
+        vertical = 1.0 if self.cols == 1 else self.rho
+        return c.cx_px - col * c.d_inf_px_per_step, c.cy_px - row * vertical * c.d_inf_px_per_step
+
     def viewpoints(self, rows: int, cols: int) -> tuple[Viewpoint, ...]:
         """A rows x cols grid of viewpoints over the span of the real cameras, row order.
 

@@ -80,8 +80,9 @@ def points_of(decoded: DecodedSet, stride: int = 1, max_depth_m: float = np.inf)
         z = depth[near]
         c = array.calibration
         right, down, forward = array.camera_position_m(camera)
-        to_right = (x - np.float32(c.cx_px)) * z / np.float32(c.fx_px) + np.float32(right)
-        downwards = (y - np.float32(c.cy_px)) * z / np.float32(c.fy_px) + np.float32(down)
+        cx, cy = array.principal_point_px(camera)
+        to_right = (x - np.float32(cx)) * z / np.float32(c.fx_px) + np.float32(right)
+        downwards = (y - np.float32(cy)) * z / np.float32(c.fy_px) + np.float32(down)
         places.append(np.stack([z + np.float32(forward), -to_right, -downwards], axis=1))
         colours.append(picture[::stride, ::stride][near])
     return Points(np.concatenate(places).astype(np.float32), np.concatenate(colours))

@@ -63,6 +63,26 @@ def test_points_lie_where_the_cameras_see_them() -> None:
     assert len(points_of(replace(_wall(), absent=((0, 0),))).places_m) == 3 * 96 * 64
 
 
+@pytest.mark.parametrize(("rows", "cols"), [(2, 2), (1, 2), (3, 1)])
+def test_cameras_that_see_infinity_at_a_disparity_agree_on_where_a_point_is(rows: int, cols: int) -> None:
+    """One point, projected by hand: each camera's principal point is where it sees infinity."""
+    given = Calibration(100.0, 100.0, 47.0, 31.0, 0.05, d_inf_px_per_step=2.0)
+    array = replace(
+        make_array(96, 64, rows=rows, cols=cols), calibration=given, rho=1.0 if cols == 1 else 1.5
+    )
+    x, y = (67, 46) if cols == 1 else (67, 49)  # in view (0, 0); 5 px a step nearer than infinity: 1 m away
+    pictures, maps = {}, {}
+    for row, col in array.real:
+        pictures[row, col] = np.zeros((64, 96, 3), np.uint8)
+        pictures[row, col][round(y - row * 7 * array.rho), x - 7 * col] = 255
+        maps[row, col] = DisparityMap(np.full((64, 96), 7, np.float32), np.ones((64, 96), np.bool_))
+    points = points_of(DecodedSet(array, 0, 0, pictures, maps, (0.0, 9.0)))
+    seen = points.places_m[points.colours[:, 0] == 255]
+    expected = [1.0, -(x - 47) / 100, -(y - 31) / 100]
+    # a pixel is a centimetre at that depth, and rho's rows lie between pixels
+    np.testing.assert_allclose(seen, np.tile(expected, (rows * cols, 1)), atol=0.0051)
+
+
 def test_depth_topics_are_what_viewers_expect_and_our_reader_ignores(tmp_path: Path) -> None:
     path = tmp_path / "depth.mcap"
     with Encoder(ARRAY, config(depth=True)) as encoder, McapWriter(path) as writer:

@@ -223,7 +223,7 @@ def test_the_command_tells_once_why_it_does_not(tmp_path: Path) -> None:
 @pytest.mark.parametrize("given", [True, False])
 def test_files_of_ours_are_recordings_too(given: bool) -> None:
     array = make_array()
-    calibration = Calibration(FX, FX, CX, CY, ACROSS_M, given=given)
+    calibration = Calibration(FX, FX, CX, CY, ACROSS_M, d_inf_px_per_step=0.75, given=given)
     content = encoded_file(replace(array, calibration=calibration, rho=1.25), 3)
     grid = tuple(tuple(f"/camera/r0{row}_c0{col}/video" for col in range(2)) for row in range(2))
     found = Recording(io.BytesIO(content), "ours", RecordingSettings(grid))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
@@ -39,6 +40,9 @@ class MessageCheck:
         self._add = add
         self._format = schemas.VIDEO_FORMATS.get(header.codec, header.codec)
         self._rig = schemas.rig_messages(header.array)
+        # Early files have the same principal point in all calibrations, whatever the disparity of infinity.
+        same = replace(header.array.calibration, d_inf_px_per_step=0.0)
+        self._early_rig = schemas.rig_messages(replace(header.array, calibration=same))
         self._kinds = {message.topic: message.kind for message in self._rig}
         self._frames: dict[str, str] = {}
         for track in header.tracks:
@@ -47,14 +51,18 @@ class MessageCheck:
             self._frames[track.topic] = schemas.frame_id(track.camera)
         self.topics = {HEADER_TRACK.topic, *self._kinds}
         self._unseen = set(self.topics)
-        self._due: set[tuple[str, bytes]] | None = None
+        self._due: dict[tuple[str, bytes], int] | None = None
         self._key: Message | None = None
 
     def begin_keyframe(self, record: Message) -> None:
         """Expect calibration and place of every camera at this time."""
         self._end_keyframe()
         self._key = record
-        self._due = {(message.topic, message.at(record.log_time)) for message in self._rig}
+        self._due = {
+            (message.topic, message.at(record.log_time)): number
+            for rig in (self._rig, self._early_rig)
+            for number, message in enumerate(rig)
+        }
 
     def push(self, message: CheckedMessage) -> bytes | None:
         """Check a message on one of the topics; returns the access unit of a video message."""
@@ -78,7 +86,8 @@ class MessageCheck:
             self._add(error("schema", f"a damaged message ({failure})", *where))
             return None
         if self._due is not None and key in self._due:
-            self._due.remove(key)
+            came = self._due[key]
+            self._due = {due: number for due, number in self._due.items() if number != came}
         else:
             text = "not as the header has it, or not at a keyframe, or twice"
             self._add(error("rig", f"{name}: {text}", *where))

@@ -105,7 +105,7 @@ def place_messages(
 ) -> tuple[RigMessage, RigMessage]:
     """Calibration (on a topic) and place of whatever sees from a viewpoint of the array."""
     return (
-        RigMessage(topic, "calibration", _calibration(array, frame)),
+        RigMessage(topic, "calibration", _calibration(array, place, frame)),
         RigMessage(TRANSFORM_TOPIC, "transform", _transform(array, place, frame)),
     )
 
@@ -169,17 +169,18 @@ def video_data(message: bytes, source: str, codec: str) -> bytes:
     return data
 
 
-def _calibration(array: CameraArray, frame: str) -> Callable[[int], bytes]:
+def _calibration(array: CameraArray, place: Viewpoint, frame: str) -> Callable[[int], bytes]:
     c = array.calibration
+    cx, cy = array.principal_point_px((place.row, place.col))
     message = CameraCalibration(
         frame_id=frame,
         width=array.width,
         height=array.height,
         distortion_model="plumb_bob",
         D=[0.0] * 5,
-        K=[c.fx_px, 0, c.cx_px, 0, c.fy_px, c.cy_px, 0, 0, 1],
+        K=[c.fx_px, 0, cx, 0, c.fy_px, cy, 0, 0, 1],
         R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
-        P=[c.fx_px, 0, c.cx_px, 0, 0, c.fy_px, c.cy_px, 0, 0, 0, 1, 0],
+        P=[c.fx_px, 0, cx, 0, 0, c.fy_px, cy, 0, 0, 0, 1, 0],
     )
     return _stamped(message)
 
