@@ -120,6 +120,9 @@ def _outvote(  # type: ignore[no-untyped-def]
         if end - start == known:
             return mean
         if start == 0 or total > ratio * strength:
+            best = mean
+            if end == known:  # the last surface has none to defend itself against
+                return best
             luma = _luma_of(x, y, mean, who[start:end], cameras, lumas, shifts, weights)
             against = np.float32(0)
             for i in range(cameras.size):
@@ -128,7 +131,7 @@ def _outvote(  # type: ignore[no-untyped-def]
                     agrees |= who[k] == i
                 if not agrees and _denies(x, y, mean, luma, cameras[i], maps, lumas, shifts[i], limits):
                     against += weights[i]
-            best, strength = mean, max(total - denial * against, np.float32(0))
+            strength = max(total - denial * against, np.float32(0))
         start = end
     return best
 
