@@ -56,10 +56,10 @@ class LayeredSettings:
     ratio: float = 1.3
     contrast: float = 10.0
     denial: float = 0.6
-    reach_px: float = 0.58
+    reach_px: float = 0.54
     spread: float | None = None
     edge_trust: float = 0.5
-    sharpness: float = -0.65
+    sharpness: float = -0.7
     hole_reach_px: int = 64
 
     def __post_init__(self) -> None:
