@@ -15,9 +15,11 @@ from mvcodec.synthesis.camera_spread import FALLBACK, LEAST, MOST, measure_sprea
 def scene(rows: int = 2, cols: int = 2) -> DecodedSet:
     """A soft texture on one plane, its maps exact."""
     decoded = PlaneScene(grid(rows, cols, 320, 240), 8).decoded()
-    return replace(
-        decoded, pictures={camera: cv2.GaussianBlur(p, (0, 0), 2) for camera, p in decoded.pictures.items()}
-    )
+    soft = {
+        camera: np.asarray(cv2.GaussianBlur(picture, (0, 0), 2), np.uint8)
+        for camera, picture in decoded.pictures.items()
+    }
+    return replace(decoded, pictures=soft)
 
 
 def noisy(decoded: DecodedSet, sigma: float) -> DecodedSet:
