@@ -18,7 +18,7 @@ at QP 27 (3 to 4 %; shop_v4: 0.6 %), 30 and 33; at QP 22 full size wins on the s
 shop_v3. `tools/disparity_qp.py` measures the same on any input.
 
 All that is of maps from every camera. Maps from every second camera, the others derived, cost fewer bits at
-equal PSNR on all three sets: 3 to 4 % at QP 27, 4 to 9 at 32, 5 to 9 at 37; on shop_v3 0.5 % at QP 25.
+equal PSNR on all three sets and shop_v2: 3 to 4 % at QP 27, 4 to 9 at 32 and 37; on shop_v3 0.5 % at QP 25.
 """
 
 from __future__ import annotations
