@@ -71,7 +71,7 @@ def _pixel(x, y, d, shift):  # type: ignore[no-untyped-def]
     return int(np.floor(at_x)), int(np.floor(at_y))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _denies(x, y, d, luma, camera, maps, lumas, shift, limits):  # type: ignore[no-untyped-def]
     """Whether a camera sees through the view's point (x, y) at d: something farther, of another luma."""
     height, width = maps.shape[1:]
@@ -88,7 +88,7 @@ def _denies(x, y, d, luma, camera, maps, lumas, shift, limits):  # type: ignore[
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _luma_of(x, y, d, who, cameras, lumas, shifts, weights):  # type: ignore[no-untyped-def]
     """Mean luma that the cameras `who` have for the view's point (x, y) at d."""
     height, width = lumas.shape[1] - 2 * BORDER, lumas.shape[2] - 2 * BORDER
@@ -101,6 +101,16 @@ def _luma_of(x, y, d, who, cameras, lumas, shifts, weights):  # type: ignore[no-
     return mean / total
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _surface(near, who, weights, start, end):  # type: ignore[no-untyped-def]
+    """(disparity, weight) of the disparities start..end-1 as one surface."""
+    total = mean = np.float32(0)
+    for k in range(start, end):
+        total += weights[who[k]]
+        mean += weights[who[k]] * near[k]
+    return mean / total, total
+
+
 @njit(cache=True, nogil=True)
 def _outvote(  # type: ignore[no-untyped-def]
     x, y, near, who, known, cameras, maps, lumas, shifts, weights, limits, ratio, denial
@@ -110,15 +120,9 @@ def _outvote(  # type: ignore[no-untyped-def]
     start = 0
     while start < known:
         end = start
-        total = np.float32(0)
-        mean = np.float32(0)
         while end < known and near[start] - near[end] <= limits[0]:
-            total += weights[who[end]]
-            mean += weights[who[end]] * near[end]
             end += 1
-        mean /= total
-        if end - start == known:
-            return mean
+        mean, total = _surface(near, who, weights, start, end)
         if start == 0 or total > ratio * strength:
             best = mean
             if end == known:  # the last surface has none to defend itself against
@@ -205,6 +209,9 @@ def vote(
                     near[place] = d
                     who[place] = i
                     known += 1
+            if known and near[0] - near[known - 1] <= near_px:
+                mean[x], _ = _surface(near, who, weights, 0, known)
+                continue
             mean[x] = _outvote(
                 x, y, near, who, known, cameras, maps, lumas, shifts, weights, limits, least, share
             )
