@@ -8,12 +8,12 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Self
+from typing import IO
 
 import numpy as np
 
 from mvcodec.array import CameraArray, Position
+from mvcodec.closing import Closing
 from mvcodec.errors import OutputError
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.stereo.matcher import Matcher
@@ -29,7 +29,7 @@ class _Entry:
     seconds: float
 
 
-class MapSpool:
+class MapSpool(Closing):
     """Maps as one matcher found them, bit for bit, in a temporary file that goes with the spool.
 
     Memory holds an index alone; the file takes 33 bits for each pixel of each map.
@@ -75,14 +75,6 @@ class MapSpool:
         if self._file is not None:
             self._file.close()
             self._file = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 class Remembered:
