@@ -28,7 +28,8 @@ class SgbmSettings:
     Attributes:
         block_size: matching window, odd.
         p1, p2: penalties of a disparity step of one and of more, for each pixel of the block
-            and each channel.
+            and each channel; less than half of what OpenCV's manual advises,
+            so that thin objects are in the maps.
         prefilter_cap: the x-derivative is truncated to +- this.
         uniqueness_percent: a match counts when every other one costs this much more.
         tolerance_px: of the left-right check.
@@ -36,9 +37,9 @@ class SgbmSettings:
         median_size: final median, 0 (none), 3 or 5.
     """
 
-    block_size: int = 1
-    p1: int = 8
-    p2: int = 32
+    block_size: int = 3
+    p1: int = 3
+    p2: int = 12
     prefilter_cap: int = 15
     uniqueness_percent: int = 0
     tolerance_px: float = 1.0

@@ -10,14 +10,13 @@ from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
 from mvcodec.stereo.joint import Joint
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stereo.pairwise import Pairwise
-from mvcodec.stereo.sgbm import Sgbm, SgbmSettings
+from mvcodec.stereo.sgbm import Sgbm
 
 MATCHERS: dict[str, Callable[[], Matcher]] = {
     "joint": Joint,
     "sgbm": lambda: Pairwise(Sgbm()),
-    # Plain maps to judge renderers by: one partner, the customary 3 x 3 block, and penalties a quarter of
-    # those that OpenCV's manual advises, so that thin objects are in the maps at all.
-    "sgbm-h": lambda: Pairwise(Sgbm(SgbmSettings(block_size=3, p1=2, p2=8)), vertical=False),
+    # Plain maps to judge renderers by: one partner.
+    "sgbm-h": lambda: Pairwise(Sgbm(), vertical=False),
     "sad": lambda: Pairwise(FixedWindow()),
     "ssd": lambda: Pairwise(FixedWindow(FixedWindowSettings("ssd", window=9, subpixel=True))),
     "ncc": lambda: Pairwise(FixedWindow(FixedWindowSettings("ncc", window=9, subpixel=True))),
