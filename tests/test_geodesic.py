@@ -13,7 +13,7 @@ from mvcodec.kernels.geodesic import UNREACHED, carry
 
 
 def plain_twin(
-    planes: NDArray[np.float32], known: Mask, edge_cost: float, disparity: FloatMap
+    planes: NDArray[np.float32], known: Mask, edge_cost: float, row_cost: float, disparity: FloatMap
 ) -> tuple[FloatMap, FloatMap]:
     """(distance, disparity) by Dijkstra's algorithm."""
     height, width = known.shape
@@ -30,22 +30,24 @@ def plain_twin(
             for u in range(max(x - 1, 0), min(x + 2, width)):
                 if not done[v, u]:
                     contrast = np.abs(planes[:, y, x] - planes[:, v, u]).max()
-                    step = np.hypot(u - x, v - y) + edge_cost * contrast
+                    step = np.hypot(u - x, row_cost * (v - y)) + edge_cost * contrast
                     heapq.heappush(queue, (float(length + step), v, u, value))
     return distance, carried
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 17), (13, 1), (23, 31)], ids=str)
 @pytest.mark.parametrize("share", [0.0, 0.03, 0.5, 1.0])
-@pytest.mark.parametrize("edge_cost", [0.0, 0.3])
-def test_equals_its_plain_twin(size: tuple[int, int], share: float, edge_cost: float) -> None:
+@pytest.mark.parametrize(("edge_cost", "row_cost"), [(0.0, 1.0), (0.3, 1.0), (0.3, 25.0)])
+def test_equals_its_plain_twin(
+    size: tuple[int, int], share: float, edge_cost: float, row_cost: float
+) -> None:
     rng = np.random.default_rng(5)
     planes = rng.uniform(0, 255, (3, *size)).astype(np.float32)
     known = rng.random(size) < share
     values = rng.permutation(size[0] * size[1]).reshape(size).astype(np.float32)
-    expected, said = plain_twin(planes, known, edge_cost, values)
+    expected, said = plain_twin(planes, known, edge_cost, row_cost, values)
     carried = values.copy()
-    distance = carry(planes, known, edge_cost, carried)
+    distance = carry(planes, known, edge_cost, row_cost, carried)
     np.testing.assert_allclose(distance, expected, rtol=1e-4)
     np.testing.assert_array_equal(carried[known], values[known])
     if edge_cost:  # whole px alone leave ties
@@ -62,6 +64,6 @@ def test_a_contour_is_not_crossed_where_a_detour_is_cheaper() -> None:
     known[2, 2] = known[2, 20] = True
     disparity = np.zeros((21, 21), np.float32)
     disparity[2, 2], disparity[2, 20] = 5, 9
-    carry(planes, known, 3.0, disparity)
+    carry(planes, known, 3.0, 1.0, disparity)
     assert (disparity[:10, :10] == 5).all()
     assert (disparity[:10, 11:] == 9).all()

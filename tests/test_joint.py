@@ -120,7 +120,7 @@ def test_beyond_the_partner_surfaces_end_where_the_picture_has_its_edges() -> No
     """Background and a coloured object, whose slanting contour only one camera sees."""
     array = linear_or_grid(1, 2, 140, 90)
     rng = np.random.default_rng(6)
-    background, object_ = rng.integers(0, 70, (90, 220, 3)), rng.integers(185, 256, (90, 220, 3))
+    background, object_ = rng.integers(20, 50, (90, 220, 3)), rng.integers(190, 220, (90, 220, 3))
     y, x = np.mgrid[:90, :220]
     pictures, truth = {}, np.zeros((90, 140), np.float32)
     for camera in array.real:

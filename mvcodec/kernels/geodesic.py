@@ -10,7 +10,6 @@ FloatMap = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 UNREACHED = np.float32(1e30)
-DIAGONAL = np.float32(2**0.5)
 
 
 @njit(cache=True, nogil=True)
@@ -28,11 +27,14 @@ def _relax(planes, distance, disparity, x, y, u, v, edge_cost, length):  # type:
 
 
 @njit(cache=True, nogil=True)
-def carry(planes: NDArray[np.float32], known: Mask, edge_cost: float, disparity: FloatMap) -> FloatMap:
+def carry(
+    planes: NDArray[np.float32], known: Mask, edge_cost: float, row_cost: float, disparity: FloatMap
+) -> FloatMap:
     """Give each pixel the disparity of the known pixel that is nearest by geodesic distance.
 
-    A step to one of the eight neighbours costs its length, px, and `edge_cost` for each grey level of the
-    channel that changes most. Distances are exact: raster scans (Toivanen 1996) go on until none shortens.
+    A step to one of the eight neighbours costs its length, px, the rows being `row_cost` px apart, and
+    `edge_cost` for each grey level of the channel that changes most. Distances are exact: raster scans
+    (Toivanen 1996) go on until none shortens.
 
     Args:
         planes: float32 (3, H, W), the picture.
@@ -44,7 +46,8 @@ def carry(planes: NDArray[np.float32], known: Mask, edge_cost: float, disparity:
     """
     height, width = known.shape
     cost = np.float32(edge_cost)
-    straight = np.float32(1)
+    along, across = np.float32(1), np.float32(row_cost)
+    diagonal = np.sqrt(along + across * across)
     distance = np.empty((height, width), np.float32)
     for y in range(height):
         for x in range(width):
@@ -63,13 +66,13 @@ def carry(planes: NDArray[np.float32], known: Mask, edge_cost: float, disparity:
                 if known[y, x]:
                     continue
                 if 0 <= x - way < width:
-                    changed |= _relax(planes, distance, disparity, x, y, x - way, y, cost, straight)
+                    changed |= _relax(planes, distance, disparity, x, y, x - way, y, cost, along)
                 if inside:
-                    changed |= _relax(planes, distance, disparity, x, y, x, behind, cost, straight)
+                    changed |= _relax(planes, distance, disparity, x, y, x, behind, cost, across)
                     if x > 0:
-                        changed |= _relax(planes, distance, disparity, x, y, x - 1, behind, cost, DIAGONAL)
+                        changed |= _relax(planes, distance, disparity, x, y, x - 1, behind, cost, diagonal)
                     if x < width - 1:
-                        changed |= _relax(planes, distance, disparity, x, y, x + 1, behind, cost, DIAGONAL)
+                        changed |= _relax(planes, distance, disparity, x, y, x + 1, behind, cost, diagonal)
         backwards = not backwards
         quiet = 0 if changed else quiet + 1
     return distance

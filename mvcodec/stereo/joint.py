@@ -42,7 +42,9 @@ class JointSettings:
         contrast: grey levels that halve P2, above 0.
         hold_per_px, hold_limit: how firmly confirmed pixels hold when the rest is completed.
         through_cost: of a disparity that another camera sees through, 0..254.
-        edge_cost: px of detour that a grey level of contrast is worth where no partner can see, at least 0.
+        edge_cost, row_cost: where no partner can see, px of detour along a row that a grey level of contrast
+            is worth, at least 0, and a step to the next row, at least 1: what stands in the world
+            lies on floors and tables, whose disparity is the same along rows.
         tolerance_px: maps agree within this, px, above 0.
         border_speckle_px: smallest patch that counts where no partner sees the whole range, pixels.
         median_size: window of the median after completion, 0 (none), 3 or 5.
@@ -68,6 +70,7 @@ class JointSettings:
     hold_limit: float = 40
     through_cost: float = 40
     edge_cost: float = 3
+    row_cost: float = 50
     tolerance_px: float = 1.0
     border_speckle_px: int = 50
     median_size: int = 5
@@ -82,6 +85,7 @@ class JointSettings:
             "through_cost": (0, 254),
             "hold_limit": (0, 254),
             "contrast": (1e-3, 255),
+            "row_cost": (1, 1e6),
             "tolerance_px": (1e-3, 255),
             "subpixel_steps": (0, 20),
         }
@@ -266,7 +270,7 @@ class Joint:
         from mvcodec.kernels import geodesic
 
         carried = disparity.copy()
-        geodesic.carry(view.planes, valid, self.settings.edge_cost, carried)
+        geodesic.carry(view.planes, valid, self.settings.edge_cost, self.settings.row_cost, carried)
         return np.where(_outside(array, camera, carried) & ~valid, carried, disparity)
 
 
