@@ -123,7 +123,8 @@ class EncoderConfig:
         if self.bitrate_kbps is not None:
             return _share(self.bitrate_kbps, DISPARITY_SHARE, array)
         assert self.quality is not None
-        return RateControl(qp=default_disparity_qp(self.quality, self.scale_for(array), range_px, self.codec))
+        scale, cameras = self.scale_for(array), self.cameras_for(array)
+        return RateControl(qp=default_disparity_qp(self.quality, scale, cameras, range_px, self.codec))
 
 
 def _share(kbps: float, share: float, array: CameraArray) -> RateControl:

@@ -399,9 +399,9 @@ def test_maps_follow_the_pictures_quantiser() -> None:
     def map_qp(**changes: object) -> int | None:
         return config(**changes).rate_of_maps(ARRAY, RANGE_PX).qp
 
-    assert map_qp(qp=20) == default_disparity_qp(20, 1, RANGE_PX)
-    assert map_qp(qp=None, crf=40.0) == map_qp(qp=40) == default_disparity_qp(40, 2, RANGE_PX)
-    assert map_qp(qp=40, disparity_scale=1) == default_disparity_qp(40, 1, RANGE_PX)
+    assert map_qp(qp=20) == default_disparity_qp(20, 1, "all", RANGE_PX)
+    assert map_qp(qp=None, crf=40.0) == map_qp(qp=40) == default_disparity_qp(40, 2, "alternate", RANGE_PX)
+    assert map_qp(qp=40, disparity_scale=1) == default_disparity_qp(40, 1, "alternate", RANGE_PX)
     assert map_qp(disparity_qp=44) == 44
 
 

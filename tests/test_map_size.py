@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 from mvcodec.errors import SettingError
 from mvcodec.frames import FloatMap, Picture
 from mvcodec.kernels.enlargement import enlarge
+from mvcodec.stream import DISPARITY_CAMERAS
 from mvcodec.video.disparity_rate import default_disparity_qp, default_disparity_scale
 from mvcodec.video.map_size import check_median, check_scale, coded_size, enlarged, small_size, to_coded
 
@@ -145,18 +148,23 @@ def test_model_halves_maps_of_coarse_pictures_only() -> None:
 
 @pytest.mark.parametrize(("codec", "top"), [("h264", 51), ("hevc", 51), ("av1", 63)])
 def test_model_quantises_small_maps_finer_and_stays_within_the_scale(codec: str, top: int) -> None:
-    for scale in (1, 2):
-        qps = [default_disparity_qp(qp, scale, (0.0, 64.0), codec) for qp in range(1, top + 1)]
+    for scale, cameras in itertools.product((1, 2), DISPARITY_CAMERAS):
+        qps = [default_disparity_qp(qp, scale, cameras, (0.0, 64.0), codec) for qp in range(1, top + 1)]
         assert qps == sorted(qps)
         assert min(qps) >= 1
         assert max(qps) <= top
-    assert default_disparity_qp(30, 2, (0.0, 64.0), codec) < default_disparity_qp(30, 1, (0.0, 64.0), codec)
+    small, whole = (default_disparity_qp(30, scale, "all", (0.0, 64.0), codec) for scale in (2, 1))
+    assert default_disparity_qp(30, 2, "alternate", (0.0, 64.0), codec) < small < whole
 
 
 def test_model_keeps_the_error_in_pixels_where_the_range_is_wider() -> None:
     """Six QPs are a quantiser's step twice as wide."""
-    assert default_disparity_qp(30, 2, (0.0, 160.0)) == default_disparity_qp(30, 2, (-10.0, 70.0)) - 6
-    assert default_disparity_qp(30, 2, (0.0, 8.0)) == default_disparity_qp(30, 2, (0.0, 64.0)) == 30
+
+    def model(width_px: float) -> int:
+        return default_disparity_qp(40, 2, "all", (-10.0, width_px - 10))
+
+    assert model(160.0) == model(80.0) - 6
+    assert model(8.0) == model(64.0) == 40
 
 
 def mean_error_px(picture: NDArray[np.uint8], small: FloatMap, truth: FloatMap) -> float:

@@ -19,6 +19,14 @@ shop_v3. `tools/disparity_qp.py` measures the same on any input.
 
 All that is of maps from every camera. Maps from every second camera, the others derived, cost fewer bits at
 equal PSNR on all three sets and shop_v2: 3 to 4 % at QP 27, 4 to 9 at 32 and 37; on shop_v3 0.5 % at QP 25.
+
+Those are worth finer maps, since each serves two views: 3 QPs less gain 0.09, 0.08 and 0.07 dB at equal
+bits on shop_v4, shop_v3 and shop_v2 at QP 28, and 0.06, 0.07 and -0.05 at QP 35 (sample: -0.04, -0.03).
+Hence 2 less.
+
+Where every camera sends a map, fine pictures bear coarser ones of half size: on tsukuba, art, cones and
+moebius 3 QPs more save 0.5 to 1.3 % of the bits at equal PSNR at QP 27, but cost up to 3.6 % at QP 32 and
+37. Hence 3 more at QP 27 and below, less up to QP 33.
 """
 
 from __future__ import annotations
@@ -39,6 +47,9 @@ class MapModel:
             camera of an array sends one.
         full: map QP less picture QP for maps of full size whose range is at most REFERENCE_PX wide.
         half: the same for maps of half size.
+        alternate: added where only every second camera sends a map.
+        fine_extra: added where all cameras do, at half size, and pictures are fine: all of it up to
+            QP FINE_UNTIL less twice this, nothing from FINE_UNTIL on.
         octave: what doubles the quantiser's step. A range twice as wide makes a code value worth twice
             the pixels, so the map QP falls by this.
     """
@@ -46,17 +57,26 @@ class MapModel:
     half_from: float
     full: int
     half: int
+    alternate: int
+    fine_extra: int
     octave: int
 
 
 REFERENCE_PX = 64.0
 """Range of disparities, between neighbouring real cameras, up to which the models' offsets hold."""
 
-H26X = MapModel(half_from=25, full=5, half=0, octave=6)
+H26X = MapModel(half_from=25, full=5, half=0, alternate=-2, fine_extra=3, octave=6)
 
 # x265's QPs have the steps of x264's: at QP 32 the model's choice is on the hull of both sets tried.
 # SVT-AV1's are 2.4 times as close; nobody has measured them.
-MODELS = {"h264": H26X, "hevc": H26X, "av1": MapModel(half_from=30, full=12, half=0, octave=14)}
+MODELS = {
+    "h264": H26X,
+    "hevc": H26X,
+    "av1": MapModel(half_from=30, full=12, half=0, alternate=-5, fine_extra=0, octave=14),
+}
+
+FINE_UNTIL = 33
+"""The QP from which on pictures are too coarse for `fine_extra`."""
 
 MOST_OCTAVES = 2.0
 """Ranges wider than REFERENCE_PX by more octaves count as these: the fit has nothing beyond."""
@@ -84,15 +104,20 @@ def default_disparity_cameras(quality: float | None, codec: str, array: CameraAr
 
 
 def default_disparity_qp(
-    quality: float, scale: int, range_px: tuple[float, float], codec: str = "h264"
+    quality: float, scale: int, cameras: str, range_px: tuple[float, float], codec: str = "h264"
 ) -> int:
     """The maps' constant QP for a QP (or CRF) of the pictures, within the codec's scale.
 
     Args:
         scale: 1 or 2, as `StreamHeader.disparity_scale`.
+        cameras: as `StreamHeader.disparity_cameras`.
         range_px: (lo, hi), as `StreamHeader.disparity_range_px`.
     """
     model = MODELS[codec]
     octaves = math.log2((range_px[1] - range_px[0]) / REFERENCE_PX)
     offset = (model.half if scale == 2 else model.full) - model.octave * min(max(octaves, 0), MOST_OCTAVES)
+    if cameras == "alternate":
+        offset += model.alternate
+    elif scale == 2:
+        offset += min(max((FINE_UNTIL - quality) / 2, 0), model.fine_extra)
     return min(max(round(quality + offset), 1), find_codec(codec).max_qp)
