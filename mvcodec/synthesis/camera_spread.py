@@ -28,7 +28,7 @@ averages out and speaks for a wider spread; sharpness speaks against it more."""
 
 LEAST, MOST = 0.05, 1.5
 SAME_SURFACE_PX = 1.0
-OUTLIER = 6.0
+OUTLIER = 30.0
 """Differences count as at most this many times their median."""
 
 SAMPLES = 10_000
