@@ -24,9 +24,9 @@ Those are worth finer maps, since each serves two views: 3 QPs less gain 0.09, 0
 bits on shop_v4, shop_v3 and shop_v2 at QP 28, and 0.06, 0.07 and -0.05 at QP 35 (sample: -0.04, -0.03).
 Hence 2 less.
 
-Where every camera sends a map, fine pictures bear coarser ones of half size: against maps of the pictures' QP,
-5 QPs more save 1.9, 1.2, 1.7 and 0.5 % of the bits at equal PSNR at QP 27 on tsukuba, art, cones and moebius;
-3 QPs more at QP 32 and 37 cost up to 3.6 %. Hence 5 more at QP 28 and below, less up to QP 33.
+Where every camera sends a map, fine pictures bear coarser ones of half size: against maps of the pictures'
+QP, 5 QPs more save 1.9, 1.2, 1.7 and 0.5 % of the bits at equal PSNR at QP 27 on tsukuba, art, cones and
+moebius; 3 QPs more at QP 32 and 37 cost up to 3.6 %. Hence 5 more at QP 28 and below, less up to QP 33.
 """
 
 from __future__ import annotations
