@@ -18,30 +18,36 @@ def project(values: FloatMap, right: float, down: float, out: FloatMap) -> None:
 
     Args:
         values: float32 (H, W), px.
-        out: float32 (H, W), raised where something nearer comes; -inf where nothing has come yet.
+        out: float32 (H + 2, W + 2), C-contiguous, overwritten: the other camera's map with a border of
+            one pixel, in which whatever leaves the picture lands; -inf where nothing comes.
     """
     height, width = values.shape
+    stride = np.int32(width + 2)
+    flat = out.ravel()
+    flat[:] = -np.inf
+    places = np.empty(width, np.int32)
+    beside, below = np.empty(width, np.int32), np.empty(width, np.int32)
     for y in range(height):
+        row = values[y]
+        for x in range(width):  # vectorised: no branch
+            d = np.float64(row[x])
+            to_x = min(max(np.float64(x) - right * d, -1.0), np.float64(width)) + 1.0
+            to_y = min(max(np.float64(y) - down * d, -1.0), np.float64(height)) + 1.0
+            u, v = np.int32(to_x), np.int32(to_y)
+            places[x] = v * stride + u
+            beside[x] = to_x > u
+            below[x] = to_y > v
         for x in range(width):
-            d = values[y, x]
-            to_x, to_y = x - right * d, y - down * d
-            # The places before and behind. (A call of floor takes as long as all the rest.)
-            u, v = int(to_x), int(to_y)
-            u -= to_x < u
-            v -= to_y < v
-            u_end, v_end = u + (to_x > u), v + (to_y > v)
-            if u >= 0 and v >= 0 and u_end < width and v_end < height:
-                out[v, u] = max(out[v, u], d)
-                if u_end > u:
-                    out[v, u_end] = max(out[v, u_end], d)
-                if v_end > v:
-                    out[v_end, u] = max(out[v_end, u], d)
-                    if u_end > u:
-                        out[v_end, u_end] = max(out[v_end, u_end], d)
-            else:
-                for row in range(max(v, 0), min(v_end + 1, height)):
-                    for col in range(max(u, 0), min(u_end + 1, width)):
-                        out[row, col] = max(out[row, col], d)
+            d = row[x]
+            place = np.uint32(places[x])
+            flat[place] = max(flat[place], d)
+            if beside[x]:
+                flat[place + np.uint32(1)] = max(flat[place + np.uint32(1)], d)
+            if below[x]:
+                place += np.uint32(stride)
+                flat[place] = max(flat[place], d)
+                if beside[x]:
+                    flat[place + np.uint32(1)] = max(flat[place + np.uint32(1)], d)
 
 
 @njit(cache=True, nogil=True)
@@ -49,21 +55,29 @@ def merge(seen: NDArray[np.float32], agreement: float, values: FloatMap, known: 
     """The nearest of several maps at each pixel, averaged with those that agree with it.
 
     Args:
-        seen: float32 (K, H, W), px; -inf where nothing is seen.
+        seen: float32 (K, H + 2, W + 2), px, see `project`.
         agreement: px; what is farther than the nearest by less agrees.
         values: float32 (H, W) out; -inf where nothing is known.
         known: bool (H, W) out.
     """
-    count, height, width = seen.shape
+    count, height, width = len(seen), *values.shape
+    nearest, total = np.empty(width, np.float32), np.empty(width, np.float32)
+    agreeing = np.empty(width, np.float32)
+    within = np.float32(agreement)
     for y in range(height):
+        nearest[:] = seen[0, y + 1, 1:-1]
+        for k in range(1, count):
+            row = seen[k, y + 1, 1:-1]
+            for x in range(width):
+                nearest[x] = max(nearest[x], row[x])
+        total[:] = 0
+        agreeing[:] = 0
+        for k in range(count):
+            row = seen[k, y + 1, 1:-1]
+            for x in range(width):
+                agrees = row[x] > nearest[x] - within
+                total[x] += row[x] if agrees else np.float32(0)
+                agreeing[x] += np.float32(1) if agrees else np.float32(0)
         for x in range(width):
-            nearest = seen[0, y, x]
-            for k in range(1, count):
-                nearest = max(nearest, seen[k, y, x])
-            total, agreeing = np.float32(0), 0
-            for k in range(count):
-                if seen[k, y, x] > nearest - agreement:
-                    total += seen[k, y, x]
-                    agreeing += 1
-            known[y, x] = agreeing > 0
-            values[y, x] = total / agreeing if agreeing > 0 else nearest
+            known[y, x] = agreeing[x] > 0
+            values[y, x] = total[x] / agreeing[x] if agreeing[x] > 0 else nearest[x]

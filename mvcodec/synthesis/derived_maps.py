@@ -37,11 +37,12 @@ def derive_map(
 
     distances = {other: _distance(array, camera, other) for other in maps}
     helpers = [other for other in sorted(maps) if distances[other] == min(distances.values())]
-    seen = np.full((len(helpers), array.height, array.width), -np.inf, np.float32)
+    seen = np.empty((len(helpers), array.height + 2, array.width + 2), np.float32)
     for other, out in zip(helpers, seen, strict=True):
         right, down = array.shift_per_disparity(other, Viewpoint(*camera))
         project(maps[other].values_px, right, down, out)
-    values, known = np.empty(seen.shape[1:], np.float32), np.empty(seen.shape[1:], np.bool_)
+    shape = array.height, array.width
+    values, known = np.empty(shape, np.float32), np.empty(shape, np.bool_)
     merge(seen, AGREEMENT_PX, values, known)
     filled = fill_from_farther(values, known, range_px[0])
     return DisparityMap(median(filled, MEDIAN, range_px), known)
