@@ -67,18 +67,34 @@ def quality_table(benchmark: Mapping[str, Any]) -> str:
 
 
 def rate_table(reports: Sequence[Mapping[str, Any]]) -> str:
-    """BD-rate against each anchor, by input."""
+    """BD-rate against the anchors of the same codec, one line an input, and who is ahead first, from where."""
     if not reports:
         return ""
-    lines = ["| input | against | bits at equal Y-PSNR, all views | overlap, dB |", "|---|---|---|---|"]
+    anchors = list(dict.fromkeys(anchor for report in reports for anchor in report["bd_rate"]))
+    lines = [
+        f"| input | codec | {' | '.join(anchors)} | overlap, dB | first overtaken |",
+        "|---" * (len(anchors) + 4) + "|",
+    ]
     for report in reports:
-        for anchor, figures in report["bd_rate"].items():
-            if figures["all"] is None:
-                continue
-            low, high = figures["overlap_db"]
-            name = Path(report["input"]).name
-            lines.append(f"| {name} | {anchor} | {figures['all']:+.1f} % | {low:.1f} - {high:.1f} |")
+        rates, codec = report["bd_rate"], report["curves"][0]["codec"]
+        known = {anchor: rates[anchor] for anchor in anchors if rates.get(anchor, {}).get("all") is not None}
+        cells = [f"{known[anchor]['all']:+.1f} %" if anchor in known else "" for anchor in anchors]
+        low = min(figures["overlap_db"][0] for figures in known.values())
+        high = max(figures["overlap_db"][1] for figures in known.values())
+        line = [Path(report["input"]).name, codec, *cells, f"{low:.1f} - {high:.1f}", _overtaken(known)]
+        lines.append(f"| {' | '.join(line)} |")
     return "\n".join(lines)
+
+
+def _overtaken(known: Mapping[str, Mapping[str, Any]]) -> str:
+    """The anchor that is ahead of mvcodec from the lowest bit rate on, and that rate."""
+    places = {anchor: figures["overtaken"] for anchor, figures in known.items() if figures["overtaken"]}
+    if not places:
+        return ""
+    anchor = min(places, key=lambda name: places[name]["kbps"])
+    where = places[anchor]
+    sign = "<= " if where["at_most"] else ""
+    return f"{anchor}: {sign}{where['kbps'] / 1000:.2f} Mbit/s, {where['psnr_y']:.1f} dB"
 
 
 def _read(path: Path) -> Any:
