@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import cv2
 import numpy as np
@@ -11,8 +11,9 @@ from small_arrays import photograph
 
 from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.container import McapWriter
+from mvcodec.decoder import Decoder
 from mvcodec.encoder import Encoder, EncoderConfig
-from mvcodec.frames import DisparityMap, FrameSet, Picture
+from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture
 from mvcodec.stream import Packet
 
 RANGE_PX = (-4.0, 12.0)
@@ -79,6 +80,12 @@ def encoded_file(array: CameraArray, frames: int, first: int = 0, **changes: obj
         for packets in encode(array, frames, first, **changes):
             writer.push(packets)
     return file.getvalue()
+
+
+def pushed(packets: Iterable[Packet]) -> list[DecodedSet]:
+    """What a new decoder makes of these packets."""
+    with Decoder() as decoder:
+        return [found for packet in packets for found in decoder.push(packet)]
 
 
 class Pipe(io.RawIOBase):
