@@ -67,7 +67,7 @@ def quality_table(benchmark: Mapping[str, Any]) -> str:
 
 
 def rate_table(reports: Sequence[Mapping[str, Any]]) -> str:
-    """BD-rate against the anchors of the same codec, one line an input, and who is ahead first, from where."""
+    """BD-rate against the anchors of the same codec, one line an input; who overtakes first."""
     if not reports:
         return ""
     anchors = list(dict.fromkeys(anchor for report in reports for anchor in report["bd_rate"]))
