@@ -30,7 +30,7 @@ WIDEST_SHARE = 0.45
 COARSE_WIDTH, FINE_WIDTH = 240, 480
 MIN_MATCHED_SHARE = 0.005
 
-_CAREFUL = SgbmSettings(block_size=3, uniqueness_percent=10)
+_CAREFUL = SgbmSettings(block_size=3, p1=8, p2=32, uniqueness_percent=10)
 _BORDER_SHARE = 1 / 64
 _WINDOW = 5
 _MIN_CONTRAST = 2.5
