@@ -8,10 +8,10 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import TracebackType
-from typing import BinaryIO, Literal, Self, get_args
+from typing import BinaryIO, Literal, get_args
 
 from mvcodec.array import Position
+from mvcodec.closing import Closing
 from mvcodec.container import McapReader
 from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
@@ -32,7 +32,7 @@ WORKERS = 2
 OnError = Literal["skip", "stop"]
 
 
-class Decoder:
+class Decoder(Closing):
     """Decodes every track. The last packet of a frame set in, its decoded set out, at once.
 
     Either `push` packets into ``Decoder()``, or iterate over ``Decoder.open(source)``.
@@ -172,14 +172,6 @@ class Decoder:
         self._end()
         if self._reader is not None:
             self._reader.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _end(self) -> None:
         if self._pool is not None:
