@@ -1,30 +1,14 @@
-"""Fixtures of the tests in a browser: a coded file, a player that serves it, Chromium and a page."""
+"""Fixtures of the tests in a browser: those of the player, Chromium and a page."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from browser_page import ARGUMENTS, CHROMIUM
-from player_files import Running, encode, playing, write_original
 from playwright.sync_api import Browser, Page, sync_playwright
 
-
-@pytest.fixture(scope="module")
-def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_original(tmp_path_factory.mktemp("browser") / "original")
-
-
-@pytest.fixture(scope="module")
-def file(original: Path) -> Path:
-    return encode(original, original.parent / "room.mcap")
-
-
-@pytest.fixture(scope="module")
-def server(file: Path, original: Path) -> Iterator[Running]:
-    with playing(file, "--original", original) as running:
-        yield running
+pytest_plugins = ("player_fixtures",)
 
 
 @pytest.fixture(scope="module")

@@ -6,13 +6,12 @@ import argparse
 import http.client
 import random
 import sys
-from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 from command_line import fails
-from player_files import FRAMES, GOP, Running, Viewer, damage, encode, playing, write_original
+from player_files import FRAMES, GOP, Running, Viewer, damage, playing, write_original
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from mvcodec.array import Viewpoint
@@ -25,23 +24,9 @@ from mvcodec.player.access import AccessRules, is_loopback
 from mvcodec.player.messages import MAX_MESSAGE_BYTES
 from mvcodec.synthesis.linear import Linear
 
+pytest_plugins = ("player_fixtures",)
+
 CLIENTS = 20
-
-
-@pytest.fixture(scope="module")
-def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_original(tmp_path_factory.mktemp("server") / "original")
-
-
-@pytest.fixture(scope="module")
-def file(original: Path) -> Path:
-    return encode(original, original.parent / "room.mcap")
-
-
-@pytest.fixture(scope="module")
-def server(file: Path, original: Path) -> Iterator[Running]:
-    with playing(file, "--original", original) as running:
-        yield running
 
 
 def get(server: Running, path: str, host: str | None = None) -> http.client.HTTPResponse:
