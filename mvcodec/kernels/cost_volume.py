@@ -104,23 +104,42 @@ def cross_arms(picture: NDArray[np.uint8], reach: int, near_reach: int, colour: 
     return arms
 
 
+# Both directions are one text; inlined where `along_rows` is a constant, each is as fast as if written alone.
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _sum_along(
+    volume: Volume,
+    arms: Arms,
+    counts: NDArray[np.float32],
+    along_rows: bool,
+    start: int,
+    stop: int,
+    sums: Volume,
+) -> None:
+    height, width, levels = volume.shape
+    length, side = (width, 0) if along_rows else (height, 2)
+    # Double precision: differences of long sums must not lose what tells two disparities apart.
+    running = np.zeros((length + 1, levels), np.float64)
+    for line in range(start, stop):
+        for place in range(length):
+            y, x = (line, place) if along_rows else (place, line)
+            for level in range(levels):
+                running[place + 1, level] = running[place, level] + volume[y, x, level]
+        for place in range(length):
+            y, x = (line, place) if along_rows else (place, line)
+            begin, end = place - arms[y, x, side], place + arms[y, x, side + 1] + 1
+            share = 1.0 / counts[y, x]
+            for level in range(levels):
+                sums[y, x, level] = (running[end, level] - running[begin, level]) * share
+
+
 @njit(cache=True, nogil=True)
 def sum_along_rows(
     volume: Volume, arms: Arms, counts: NDArray[np.float32], start: int, stop: int, sums: Volume
 ) -> None:
     """Sum the costs over each pixel's left and right arm, divided by its count; rows start .. stop - 1."""
-    width, levels = volume.shape[1], volume.shape[2]
-    # Double precision: differences of long sums must not lose what tells two disparities apart.
-    running = np.zeros((width + 1, levels), np.float64)
-    for y in range(start, stop):
-        for x in range(width):
-            for level in range(levels):
-                running[x + 1, level] = running[x, level] + volume[y, x, level]
-        for x in range(width):
-            begin, end = x - arms[y, x, 0], x + arms[y, x, 1] + 1
-            share = 1.0 / counts[y, x]
-            for level in range(levels):
-                sums[y, x, level] = (running[end, level] - running[begin, level]) * share
+    _sum_along(volume, arms, counts, True, start, stop, sums)
 
 
 @njit(cache=True, nogil=True)
@@ -128,17 +147,49 @@ def sum_along_columns(
     volume: Volume, arms: Arms, counts: NDArray[np.float32], start: int, stop: int, sums: Volume
 ) -> None:
     """Sum the costs over each pixel's upper and lower arm, by its count; columns start .. stop - 1."""
-    height, levels = volume.shape[0], volume.shape[2]
-    running = np.zeros((height + 1, levels), np.float64)
-    for x in range(start, stop):
-        for y in range(height):
+    _sum_along(volume, arms, counts, False, start, stop, sums)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _follow(
+    volume: Volume,
+    first_edges: NDArray[np.bool_],
+    second_edges: NDArray[np.bool_],
+    low: int,
+    penalties: NDArray[np.float32],
+    along_rows: bool,
+    backward: bool,
+    start: int,
+    stop: int,
+    total: Volume,
+) -> None:
+    height, width, levels = volume.shape
+    # In a row, the first pixel has no edge before it.
+    length, first_target = (width, 1) if along_rows else (height, 0)
+    before, path = np.empty(levels + 2, np.float32), np.empty(levels + 2, np.float32)
+    for line in range(start, stop):
+        before[:] = np.inf
+        for step in range(length):
+            place = length - 1 - step if backward else step
+            border = place + 1 if backward else place
+            y, x = (line, place) if along_rows else (place, line)
+            edge_y, edge_x = (line, border) if along_rows else (border, line)
+            first_edge = step > 0 and first_edges[edge_y, edge_x]
+            least = before[1:-1].min() if step > 0 else np.float32(0)
+            path[0] = path[levels + 1] = np.inf
             for level in range(levels):
-                running[y + 1, level] = running[y, level] + volume[y, x, level]
-        for y in range(height):
-            begin, end = y - arms[y, x, 2], y + arms[y, x, 3] + 1
-            share = 1.0 / counts[y, x]
-            for level in range(levels):
-                sums[y, x, level] = (running[end, level] - running[begin, level]) * share
+                cost = volume[y, x, level]
+                if step > 0:
+                    target = edge_x - low - level
+                    inside = first_target <= target < width
+                    second_edge = second_edges[edge_y, target] if inside else first_edge
+                    row = np.int64(first_edge) + np.int64(second_edge)
+                    reached = min(before[level], before[level + 2]) + penalties[row, 0]
+                    reached = min(reached, before[level + 1], least + penalties[row, 1])
+                    cost += reached - least
+                path[level + 1] = cost
+                total[y, x, level] += cost
+            before, path = path, before
 
 
 @njit(cache=True, nogil=True)
@@ -162,28 +213,7 @@ def follow_rows(
         backward: paths run from right to left.
         total: float32 (H, W, levels), added to.
     """
-    width, levels = volume.shape[1], volume.shape[2]
-    before, path = np.empty(levels + 2, np.float32), np.empty(levels + 2, np.float32)
-    for y in range(start, stop):
-        before[:] = np.inf
-        for step in range(width):
-            x = width - 1 - step if backward else step
-            border = x + 1 if backward else x
-            first_edge = step > 0 and first_edges[y, border]
-            least = before[1:-1].min() if step > 0 else np.float32(0)
-            path[0] = path[levels + 1] = np.inf
-            for level in range(levels):
-                cost = volume[y, x, level]
-                if step > 0:
-                    target = border - low - level
-                    second_edge = second_edges[y, target] if 0 < target < width else first_edge
-                    row = np.int64(first_edge) + np.int64(second_edge)
-                    reached = min(before[level], before[level + 2]) + penalties[row, 0]
-                    reached = min(reached, before[level + 1], least + penalties[row, 1])
-                    cost += reached - least
-                path[level + 1] = cost
-                total[y, x, level] += cost
-            before, path = path, before
+    _follow(volume, first_edges, second_edges, low, penalties, True, backward, start, stop, total)
 
 
 @njit(cache=True, nogil=True)
@@ -205,28 +235,7 @@ def follow_columns(
         backward: paths run from bottom to top.
         The others as in `follow_rows`.
     """
-    height, width, levels = volume.shape
-    before, path = np.empty(levels + 2, np.float32), np.empty(levels + 2, np.float32)
-    for x in range(start, stop):
-        before[:] = np.inf
-        for step in range(height):
-            y = height - 1 - step if backward else step
-            border = y + 1 if backward else y
-            first_edge = step > 0 and first_edges[border, x]
-            least = before[1:-1].min() if step > 0 else np.float32(0)
-            path[0] = path[levels + 1] = np.inf
-            for level in range(levels):
-                cost = volume[y, x, level]
-                if step > 0:
-                    target = x - low - level
-                    second_edge = second_edges[border, target] if 0 <= target < width else first_edge
-                    row = np.int64(first_edge) + np.int64(second_edge)
-                    reached = min(before[level], before[level + 2]) + penalties[row, 0]
-                    reached = min(reached, before[level + 1], least + penalties[row, 1])
-                    cost += reached - least
-                path[level + 1] = cost
-                total[y, x, level] += cost
-            before, path = path, before
+    _follow(volume, first_edges, second_edges, low, penalties, False, backward, start, stop, total)
 
 
 @njit(cache=True, nogil=True)
