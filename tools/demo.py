@@ -202,11 +202,11 @@ def code_anchor(source: ArraySource, qp: int) -> CodedArray:
 def table(info: StreamInfo, quality: Comparison, anchor: CodedArray, qp: int) -> str:
     """Bits and quality of both, side by side."""
     seconds = info.frames / info.header.array.fps
-    real = len(info.header.array.real)
+    streams = f"{len(info.header.array.real)} + {len(info.header.map_cameras)} maps"
     lines = [
         "",
         f"{info.frames} frame sets at QP {qp}     {'mvcodec file':>14} {'full simulcast':>15}",
-        f"{'streams':24} {f'{real} + {real} maps':>14} {len(anchor.quality.views):15}",
+        f"{'streams':24} {streams:>14} {len(anchor.quality.views):15}",
         f"{'kbit':24} {info.bits.total / 1e3:14.1f} {anchor.bits / 1e3:15.1f}",
         f"{'kbit/s':24} {info.bits.total / seconds / 1e3:14.1f} {anchor.bits / seconds / 1e3:15.1f}",
     ]
