@@ -5,7 +5,7 @@
 First the stages by themselves, in this process: each frame set decoded, its first view (which prepares the
 cameras), another view, and its JPEG. Then `mvcodec play` in a process of its own, with a viewer that plays
 in a loop and drags all the time, and one that drags while paused; they draw nothing. Printed: medians of the
-stages in ms, wall and CPU, and of each round: pictures a second, the share of them at full size, CPU ms of
+stages in ms, wall and CPU, and of each round: pictures a second, their sides' share of full size, CPU ms of
 the server for each, and how much of the machine others took meanwhile: without that no rate means much.
 """
 
@@ -110,14 +110,14 @@ class Round:
 
     Attributes:
         pictures_per_s: drawn.
-        whole: share of the pictures that had full size.
+        scale: mean of the pictures' sides, as a share of the full size's.
         cpu_ms: of the server, for each picture.
         dropped_per_s: frames that were due and not shown.
         others: share of the machine's time that other processes took.
     """
 
     pictures_per_s: float
-    whole: float
+    scale: float
     cpu_ms: float
     dropped_per_s: float
     others: float
@@ -190,7 +190,7 @@ def measure_playing(path: Path, seconds: float, rounds: int) -> list[Round]:
                 found.append(
                     Round(
                         len(facts) / took_s,
-                        sum(fact["scale"] == 1 for fact in facts) / len(facts),
+                        sum(fact["scale"] for fact in facts) / len(facts),
                         1000 * own_s / len(facts),
                         (facts[-1]["dropped"] - dropped) / took_s,
                         max(0.0, busy_s - own_s) / all_s,
@@ -252,7 +252,7 @@ def main() -> int:
         print(f"{name:11} {stage['wall_ms']:6.1f} ms wall {stage['cpu_ms']:6.1f} ms CPU")
     for item in rounds:
         print(
-            f"playing and dragging: {item.pictures_per_s:5.1f} pictures/s, {item.whole:4.0%} of full size, "
+            f"playing and dragging: {item.pictures_per_s:5.1f} pictures/s, sides {item.scale:4.0%}, "
             f"{item.cpu_ms:5.1f} ms CPU each, {item.dropped_per_s:4.1f} frames/s dropped; "
             f"others took {item.others:.0%} of the machine"
         )
