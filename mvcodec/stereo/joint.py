@@ -74,7 +74,7 @@ class JointSettings:
     tolerance_px: float = 1.0
     border_speckle_px: int = 50
     median_size: int = 5
-    subpixel_steps: int = 2
+    subpixel_steps: int = 3
 
     def __post_init__(self) -> None:
         limits = {
