@@ -61,7 +61,8 @@ def measure_spread(decoded: DecodedSet) -> float:
     noise = (beside - placement) / 2
     if placement <= 0:
         return MOST
-    return min(max(FACTOR * max(noise / placement, 0.0) ** POWER, LEAST), MOST)
+    ratio = max(noise / placement, 0.0)
+    return float(min(max(FACTOR * ratio**POWER, LEAST), MOST))
 
 
 def _pairs(decoded: DecodedSet) -> tuple[list[Pair], list[Pair]]:
