@@ -23,9 +23,8 @@ FALLBACK = 0.4
 """Where cameras stand in one line, which can't tell noise from misplacement."""
 
 FACTOR, POWER = 0.6, 1.5
-"""The spread is FACTOR * (noise / placement)^POWER. Independent errors would have 1 and 1; fitted to the best
-spreads of antinous and the shop sets, uncoded and coded: little of the misplacement is independent, since
-cameras on opposite sides of a view are misplaced in opposite directions, and less so where noise prevails.
+"""The spread is FACTOR * (noise / placement)^POWER: 1 and 1 by the reasoning above, but errors are not quite
+independent. Fitted to the best spreads of antinous and the shop sets, uncoded, and of shop_v3 and v4, coded.
 """
 
 LEAST, MOST = 0.05, 1.5
