@@ -70,10 +70,28 @@ def screenshot(page: Page, name: str) -> None:
     page.screenshot(path=SCREENSHOTS / f"{name}.png")
 
 
-def settle(page: Page) -> tuple[int, float, float]:
-    """What is on the screen once it has stopped changing."""
-    last = None
-    while last != (last := on_screen(page)):
-        page.wait_for_timeout(300)
-    shows(page, scale=1)
-    return last
+def comes_to(page: Page, frame: int, row: float, col: float) -> None:
+    """Wait until the whole picture of a viewpoint is on the screen; rows and columns to 1e-6 of a step."""
+    page.wait_for_function(
+        """([frame, row, col]) => {
+            const shown = document.body.dataset;
+            const near = (text, value) => Math.abs(Number(text) - value) < 1e-6;
+            return Number(shown.frame) === frame && near(shown.row, row) && near(shown.col, col)
+                && Number(shown.scale) === 1;
+        }""",
+        arg=[frame, row, col],
+    )
+
+
+def stands_still(page: Page, for_ms: float) -> None:
+    """Wait until the picture on the screen has not changed for so long (a picture may still be under way)."""
+    page.evaluate("document.body.dataset.stillSince = performance.now()")
+    page.wait_for_function(
+        """(forMs) => {
+            const body = document.body.dataset;
+            const shown = [body.frame, body.row, body.col].join();
+            if (shown !== body.stillShows) [body.stillShows, body.stillSince] = [shown, performance.now()];
+            return performance.now() - body.stillSince > forMs;
+        }""",
+        arg=for_ms,
+    )

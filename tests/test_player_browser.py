@@ -15,13 +15,14 @@ from browser_page import (
     NO_CHROMIUM,
     SAME_DB,
     box_of,
+    comes_to,
     on_screen,
     pixels,
     rendered,
     screenshot,
-    settle,
     show,
     shows,
+    stands_still,
 )
 from player_files import FRAMES, Running
 from playwright.sync_api import Browser, Page
@@ -32,6 +33,7 @@ from mvcodec.player.looks import LOOKS
 pytest_plugins = ("browser_fixtures",)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 
+STILL_MS = 1000  # several frames at half speed
 LOOK_KEYS = {
     "d": "disparity",
     "l": "layers",
@@ -87,10 +89,7 @@ def test_plays_loops_and_pauses(page: Page, server: Running) -> None:
         page.wait_for_selector(f"body[data-frame='{frame}'], body[data-frame='{frame + 1}']")
     page.keyboard.press(" ")
     page.wait_for_selector("#play[aria-pressed=false]")
-    page.wait_for_timeout(150)
-    before = on_screen(page)
-    page.wait_for_timeout(300)
-    assert on_screen(page) == before
+    stands_still(page, STILL_MS)
 
 
 def test_dragging_shows_what_the_library_renders_there(page: Page, server: Running, file: Path) -> None:
@@ -98,14 +97,11 @@ def test_dragging_shows_what_the_library_renders_there(page: Page, server: Runni
     page.mouse.move(640, 300)
     page.mouse.down()
     page.mouse.move(500, 360, steps=6)
-    page.wait_for_timeout(100)
     page.mouse.up()
     # The scene follows the pointer, so that the viewpoint goes the other way; the picture is 1080 x 720.
     row, col = 1 - 60 / 720 * 2, 1 + 140 / 1080 * 2
-    frame, shown_row, shown_col = settle(page)
-    assert (shown_row, shown_col) == pytest.approx((row, col), abs=1e-6)
-    assert frame == 0
-    there = psnr(rendered(file, 0, shown_row, shown_col), pixels(page))
+    comes_to(page, 0, row, col)
+    there = psnr(rendered(file, 0, row, col), pixels(page))
     assert there > max(SAME_DB, psnr(rendered(file, 0, 1, 1), pixels(page)))
 
 
@@ -115,9 +111,7 @@ def test_a_finger_drags_as_the_mouse_does(page: Page, server: Running) -> None:
     for kind, x in (("touchStart", 640), ("touchMove", 600), ("touchMove", 500)):
         finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": 300}]})
     finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    frame, row, col = settle(page)
-    assert (frame, row) == (0, 1.0)
-    assert col == pytest.approx(1 + 140 / 1080 * 2, abs=1e-6)
+    comes_to(page, 0, 1, 1 + 140 / 1080 * 2)
 
 
 def test_moves_by_keys_and_on_the_map(page: Page, server: Running) -> None:
@@ -171,8 +165,7 @@ def test_a_link_shows_the_same_picture(page: Page, browser: Browser, server: Run
     page.keyboard.press(".")
     page.keyboard.press("ArrowRight")
     shows(page, frame=8, col=1.5)
-    page.wait_for_timeout(500)
-    assert page.url.endswith("#frame=8&view=0.5,1.5&look=anaglyph&eyes=0.3")
+    page.wait_for_url("**#frame=8&view=0.5,1.5&look=anaglyph&eyes=0.3")
     other = browser.new_page(viewport={"width": 1280, "height": 720})
     other.goto(page.url)
     shows(other, frame=8, row=0.5, col=1.5, look="anaglyph")

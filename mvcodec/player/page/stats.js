@@ -20,7 +20,9 @@ export class Stats {
     this.drawn.push(performance.now());
     this.recent.push(facts);
     if (this.recent.length > LAST) this.recent.shift();
+    const first = this.facts === null;
     this.facts = facts;
+    if (first) this.write(); // the others wait for the clock, so that the line can be read
   }
 
   get fps() {
