@@ -1,16 +1,17 @@
 """The default matcher: each camera against all its partners in one cost volume, then all maps together.
 
 One disparity explains a camera's horizontal and its vertical partner (ALGORITHMS section 0), so that
-their costs are added before any decision is taken. Semi-global matching decides; what no other camera's
-map confirms is decided again from its surroundings alone, except that a place which another camera
-sees through is ruled out. What no partner can see, beyond the borders of their pictures, takes the
-disparity of the confirmed surface that it is connected with best.
+their costs are added before any decision is taken, after cameras of unequal exposure have been made
+equally bright. Semi-global matching decides; what no other camera's map confirms is decided again from
+its surroundings alone, except that a place which another camera sees through is ruled out. What no
+partner can see, beyond the borders of their pictures, takes the disparity of the confirmed surface that it
+is connected with best.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,10 +19,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvcodec.array import CameraArray, Position, Viewpoint
+from mvcodec.array import CameraArray, Position
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.stereo.consistency import drop_speckles, median
+from mvcodec.stereo.exposure import camera_gains
+from mvcodec.stereo.partners import neighbours, outside, partners, steps, unseen_border
 from mvcodec.stereo.subpixel import refine
 
 THREADS = 2
@@ -126,31 +129,17 @@ class Joint:
             shape = (array.height, array.width)
             flat = DisparityMap(np.full(shape, range_px[0], np.float32), np.zeros(shape, np.bool_))
             return dict.fromkeys(array.real, flat)
-        low = int(np.floor(range_px[0])) - 1
-        levels = int(np.ceil(range_px[1])) + 2 - low
-        levels += -levels % LEVELS_MULTIPLE
+        ones = {camera: np.ones(3, np.float32) for camera in array.real}
         with ThreadPoolExecutor(THREADS) as pool:
-            prepared = pool.map(lambda camera: _prepare(array, pictures[camera]), array.real)
-            views = dict(zip(array.real, prepared, strict=True))
-            raw = dict(
-                zip(
-                    array.real,
-                    pool.map(lambda camera: self._decide(array, camera, views, low, levels), array.real),
-                    strict=True,
-                )
-            )
-            valid = {camera: self._confirmed(array, camera, raw, range_px) for camera in array.real}
-            completed = pool.map(
-                lambda camera: self._complete(array, camera, views[camera], raw, valid, low, levels),
-                array.real,
-            )
-            maps = {
-                camera: median(np.clip(values, *range_px), self.settings.median_size, range_px)
-                for camera, values in zip(array.real, completed, strict=True)
-            }
-            for _ in range(self.settings.subpixel_steps):
-                refined = pool.map(partial(_refined, array, views, maps, valid), array.real)
-                maps = dict(zip(array.real, refined, strict=True))
+
+            def matched(
+                array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
+            ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
+                return self._matched(array, _prepared(array, pictures, ones, pool), range_px, pool)
+
+            gains = camera_gains(array, pictures, range_px, matched)
+            views = _prepared(array, pictures, gains, pool)
+            maps, valid = self._refined_maps(array, views, range_px, pool)
             extended = pool.map(
                 lambda camera: self._beyond_partners(
                     array, camera, views[camera], valid[camera], np.clip(maps[camera], *range_px)
@@ -162,6 +151,42 @@ class Joint:
                 for camera, values in zip(array.real, extended, strict=True)
             }
 
+    def _refined_maps(
+        self,
+        array: CameraArray,
+        views: Mapping[Position, _View],
+        range_px: tuple[float, float],
+        pool: Executor,
+    ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
+        """Maps that are complete and sub-pixel, and where another camera confirms them."""
+        low, levels = _levels(range_px)
+        raw, valid = self._matched(array, views, range_px, pool)
+        completed = pool.map(
+            lambda camera: self._complete(array, camera, views[camera], raw, valid, low, levels),
+            array.real,
+        )
+        maps = {
+            camera: median(np.clip(values, *range_px), self.settings.median_size, range_px)
+            for camera, values in zip(array.real, completed, strict=True)
+        }
+        for _ in range(self.settings.subpixel_steps):
+            refined = pool.map(partial(_refined, array, views, maps, valid), array.real)
+            maps = dict(zip(array.real, refined, strict=True))
+        return maps, valid
+
+    def _matched(
+        self,
+        array: CameraArray,
+        views: Mapping[Position, _View],
+        range_px: tuple[float, float],
+        pool: Executor,
+    ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
+        """The disparity of every camera by its own pictures, and where another camera confirms it."""
+        low, levels = _levels(range_px)
+        decided = pool.map(lambda camera: self._decide(array, camera, views, low, levels), array.real)
+        raw = dict(zip(array.real, decided, strict=True))
+        return raw, {camera: self._confirmed(array, camera, raw, range_px) for camera in array.real}
+
     def _decide(
         self, array: CameraArray, camera: Position, views: Mapping[Position, _View], low: int, levels: int
     ) -> FloatMap:
@@ -169,16 +194,16 @@ class Joint:
         from mvcodec.kernels import semiglobal
 
         settings = self.settings
-        partners = _partners(array, camera)
-        bounds = [views[p].across if p[0] == camera[0] else views[p].down for p in partners]
+        beside = partners(array, camera)
+        bounds = [views[p].across if p[0] == camera[0] else views[p].down for p in beside]
         view = views[camera]
         costs = np.empty((*view.grey.shape, levels), np.uint8)
         semiglobal.joint_costs(
             view.planes,
             view.census,
             np.stack([bound for bound in bounds if bound is not None]),
-            np.stack([views[partner].census for partner in partners]),
-            _steps(array, camera, partners),
+            np.stack([views[partner].census for partner in beside]),
+            steps(array, camera, beside),
             low,
             settings.colour_limit,
             settings.bit_cost,
@@ -213,14 +238,14 @@ class Joint:
         """Pixels that other cameras confirm, less specks where no partner sees the whole range."""
         from mvcodec.kernels import semiglobal
 
-        others = _neighbours(array, camera)
+        others = neighbours(array, camera)
         kept: Mask = semiglobal.confirmed(
             raw[camera],
             np.stack([raw[other] for other in others]),
-            _steps(array, camera, others),
+            steps(array, camera, others),
             self.settings.tolerance_px,
         )
-        border = _unseen_border(array, camera, range_px)
+        border = unseen_border(array, camera, range_px)
         firm = drop_speckles(raw[camera], kept & border, self.settings.border_speckle_px)
         return np.where(border, firm, kept)
 
@@ -238,14 +263,14 @@ class Joint:
         from mvcodec.kernels import semiglobal
 
         settings = self.settings
-        others = _neighbours(array, camera)
+        others = neighbours(array, camera)
         costs = np.empty((*view.grey.shape, levels), np.uint8)
         semiglobal.completion_costs(
             raw[camera],
             valid[camera],
             np.stack([raw[other] for other in others]),
             np.stack([valid[other] for other in others]),
-            _steps(array, camera, others),
+            steps(array, camera, others),
             low,
             settings.hold_per_px,
             settings.hold_limit,
@@ -271,7 +296,7 @@ class Joint:
 
         carried = disparity.copy()
         geodesic.carry(view.planes, valid, self.settings.edge_cost, self.settings.row_cost, carried)
-        return np.where(_outside(array, camera, carried) & ~valid, carried, disparity)
+        return np.where(outside(array, camera, carried) & ~valid, carried, disparity)
 
 
 def _refined(
@@ -281,61 +306,41 @@ def _refined(
     valid: Mapping[Position, Mask],
     camera: Position,
 ) -> FloatMap:
-    partners = _partners(array, camera)
-    said = [(views[partner].grey, maps[partner]) for partner in partners]
-    return refine(maps[camera], valid[camera], views[camera].grey, said, _steps(array, camera, partners))
+    beside = partners(array, camera)
+    said = [(views[partner].grey, maps[partner]) for partner in beside]
+    return refine(maps[camera], valid[camera], views[camera].grey, said, steps(array, camera, beside))
 
 
-def _prepare(array: CameraArray, picture: Picture) -> _View:
+def _levels(range_px: tuple[float, float]) -> tuple[int, int]:
+    """The lowest level, px, and how many."""
+    low = int(np.floor(range_px[0])) - 1
+    levels = int(np.ceil(range_px[1])) + 2 - low
+    return low, levels + -levels % LEVELS_MULTIPLE
+
+
+def _prepared(
+    array: CameraArray,
+    pictures: Mapping[Position, Picture],
+    gains: Mapping[Position, NDArray[np.float32]],
+    pool: Executor,
+) -> dict[Position, _View]:
+    views = pool.map(lambda camera: _prepare(array, pictures[camera], gains[camera]), array.real)
+    return dict(zip(array.real, views, strict=True))
+
+
+def _prepare(array: CameraArray, picture: Picture, gain: NDArray[np.float32]) -> _View:
     from mvcodec.kernels import census, semiglobal
 
     planes = np.ascontiguousarray(picture.transpose(2, 0, 1)).astype(np.float32)
     grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), np.uint8)
+    level = grey.astype(np.float32)
+    if np.any(gain != 1):
+        planes *= gain[:, None, None]
+        level = np.asarray(cv2.cvtColor(planes.transpose(1, 2, 0), cv2.COLOR_RGB2GRAY), np.float32)
     return _View(
         planes,
-        grey.astype(np.float32),
+        level,
         census.census_transform(grey, 4, 3),
         semiglobal.sampling_interval(planes, 1, 0) if array.col_step else None,
         semiglobal.sampling_interval(planes, 0, 1) if array.row_step else None,
     )
-
-
-def _around(array: CameraArray, camera: Position, *, diagonal: bool) -> list[Position]:
-    row, col = array.real_rows.index(camera[0]), array.real_cols.index(camera[1])
-    found = []
-    for down in (-1, 0, 1):
-        for across in (-1, 0, 1):
-            beside = (down == 0) != (across == 0) or (diagonal and down != 0 and across != 0)
-            if beside and 0 <= row + down < len(array.real_rows) and 0 <= col + across < len(array.real_cols):
-                found.append((array.real_rows[row + down], array.real_cols[col + across]))
-    return found
-
-
-def _partners(array: CameraArray, camera: Position) -> list[Position]:
-    """The real cameras beside, above and below a camera."""
-    return _around(array, camera, diagonal=False)
-
-
-def _neighbours(array: CameraArray, camera: Position) -> list[Position]:
-    """The partners of a camera and those across the corners of its cells."""
-    return _around(array, camera, diagonal=True)
-
-
-def _steps(array: CameraArray, camera: Position, others: list[Position]) -> NDArray[np.float32]:
-    """float32 (P, 2): what a pixel moves (left, up) for each px of disparity, from camera to each other."""
-    return np.array([array.shift_per_disparity(camera, Viewpoint(*other)) for other in others], np.float32)
-
-
-def _unseen_border(array: CameraArray, camera: Position, range_px: tuple[float, float]) -> Mask:
-    """bool (H, W): where the nearest disparity leaves every partner's picture."""
-    return _outside(array, camera, np.full((array.height, array.width), range_px[1], np.float32))
-
-
-def _outside(array: CameraArray, camera: Position, disparity: FloatMap) -> Mask:
-    """bool (H, W): where a pixel of this disparity leaves every partner's picture."""
-    unseen = np.ones((array.height, array.width), np.bool_)
-    x, y = np.arange(array.width)[None], np.arange(array.height)[:, None]
-    for by_x, by_y in _steps(array, camera, _partners(array, camera)):
-        there_x, there_y = x - by_x * disparity, y - by_y * disparity
-        unseen &= (there_x < 0) | (there_x >= array.width) | (there_y < 0) | (there_y >= array.height)
-    return unseen
