@@ -111,6 +111,7 @@ class Round:
     Attributes:
         pictures_per_s: drawn.
         scale: mean of the pictures' sides, as a share of the full size's.
+        quick: share of pictures that the quick synthesizer drew.
         cpu_ms: of the server, for each picture.
         dropped_per_s: frames that were due and not shown.
         others: share of the machine's time that other processes took.
@@ -118,6 +119,7 @@ class Round:
 
     pictures_per_s: float
     scale: float
+    quick: float
     cpu_ms: float
     dropped_per_s: float
     others: float
@@ -191,6 +193,7 @@ def measure_playing(path: Path, seconds: float, rounds: int) -> list[Round]:
                     Round(
                         len(facts) / took_s,
                         sum(fact["scale"] for fact in facts) / len(facts),
+                        sum(fact["quick"] for fact in facts) / len(facts),
                         1000 * own_s / len(facts),
                         (facts[-1]["dropped"] - dropped) / took_s,
                         max(0.0, busy_s - own_s) / all_s,
@@ -253,6 +256,7 @@ def main() -> int:
     for item in rounds:
         print(
             f"playing and dragging: {item.pictures_per_s:5.1f} pictures/s, sides {item.scale:4.0%}, "
+            f"quick {item.quick:4.0%}, "
             f"{item.cpu_ms:5.1f} ms CPU each, {item.dropped_per_s:4.1f} frames/s dropped; "
             f"others took {item.others:.0%} of the machine"
         )

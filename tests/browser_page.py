@@ -77,7 +77,7 @@ def comes_to(page: Page, frame: int, row: float, col: float) -> None:
             const shown = document.body.dataset;
             const near = (text, value) => Math.abs(Number(text) - value) < 1e-6;
             return Number(shown.frame) === frame && near(shown.row, row) && near(shown.col, col)
-                && Number(shown.scale) === 1;
+                && Number(shown.scale) === 1 && shown.quick === 'false';
         }""",
         arg=[frame, row, col],
     )

@@ -9,7 +9,7 @@ from plane_scene import Plane, PlaneScene, grid
 
 from mvcodec.array import Calibration, CameraArray, Viewpoint
 from mvcodec.evaluation.metrics import psnr
-from mvcodec.player.draft import BUDGET_S, SCALES, WINDOW, Pace, in_full_px, shrink
+from mvcodec.player.draft import BUDGET_S, QUICKER, SMALLER, WHOLE, WINDOW, Level, Pace, in_full_px, shrink
 from mvcodec.player.messages import Measure, Message, Move, Play, Ready, Seek
 from mvcodec.player.session import MOVING_S, Session
 from mvcodec.synthesis.linear import Linear, LinearSettings
@@ -18,7 +18,7 @@ SYNTHESIZER = Linear(LinearSettings(fill_holes=True))
 SCENE = PlaneScene(grid(3, 5, 96, 64, step=2), 8, (Plane(16, (20, 40, 50, 80)),))
 
 
-@pytest.mark.parametrize("scale", SCALES[1:])
+@pytest.mark.parametrize("scale", [0.75, 0.5])
 def test_a_draft_is_the_view_of_its_size(scale: float) -> None:
     decoded, place = SCENE.decoded(), Viewpoint(1.0, 1.0)
     for camera, picture in decoded.pictures.items():  # noise would not survive any change of size
@@ -43,26 +43,44 @@ def steady(pace: Pace, cost_s: float, allowed_s: float = 0.0) -> None:
         pace.note(cost_s, allowed_s)
 
 
-def test_the_scale_follows_the_cost_and_returns() -> None:
-    pace = Pace()
-    for cost, scale in (
-        (0.9, 1),
-        (1.1, 0.75),
-        (0.9, 0.75),
-        (1.1, 0.5),
-        (9, 0.5),
-        (0.9, 0.5),
-        (0.2, 1),
-        (3, 0.5),
+@pytest.mark.parametrize("levels", [SMALLER, QUICKER])
+def test_the_level_follows_the_cost_and_returns(levels: tuple[Level, ...]) -> None:
+    pace = Pace(levels)
+    worst = len(levels) - 1
+    for cost, place in (
+        (0.95, 0),
+        (1.1, 1),
+        (0.95, 1),
+        (1.1, 2),
+        (9, worst),
+        (0.95, worst),
+        (0.1, 0),
+        (9, worst),
     ):
         steady(pace, cost * BUDGET_S)
-        assert pace.scale == scale
+        assert pace.level is levels[place]
+
+
+def test_a_level_that_would_just_do_is_not_returned_to() -> None:
+    pace = Pace(SMALLER)
+    steady(pace, 1.1 * BUDGET_S)
+    steady(pace, 0.95 * SMALLER[1].cost * BUDGET_S)
+    assert pace.level is SMALLER[1]
+    steady(pace, 0.8 * SMALLER[1].cost * BUDGET_S)
+    assert pace.level is WHOLE
+
+
+def test_levels_are_ordered() -> None:
+    for levels in (SMALLER, QUICKER):
+        assert levels[0] is WHOLE
+        assert sorted(levels, key=lambda level: -level.cost) == list(levels)
+        assert sorted(levels, key=lambda level: -level.scale) == list(levels)
 
 
 def test_slow_frames_have_more_time() -> None:
-    pace = Pace()
+    pace = Pace(SMALLER)
     steady(pace, 1.5 * BUDGET_S, allowed_s=2 * BUDGET_S)
-    assert pace.scale == 1
+    assert pace.level is WHOLE
 
 
 def slow_session(*messages: Message) -> Session:
@@ -73,36 +91,61 @@ def slow_session(*messages: Message) -> Session:
     return session
 
 
-def scale_at(session: Session, now_s: float) -> float:
+def level_at(session: Session, now_s: float) -> Level:
     request = session.next_request(now_s)
     assert request is not None
     session.made(request, 0.2, now_s)
-    return request.scale
+    return request.level
 
 
 def test_playing_uses_drafts_and_a_picture_that_stands_is_whole() -> None:
     session = slow_session(Play(True))
-    scales = [scale_at(session, number / 10) for number in range(WINDOW + 1)]
-    assert scales == [1.0] * WINDOW + [SCALES[-1]]
+    levels = [level_at(session, number / 10) for number in range(WINDOW + 1)]
+    assert levels == [WHOLE] * WINDOW + [SMALLER[-1]]
     session.apply(Measure(True), 0.7)
-    assert scale_at(session, 0.7) == 1
+    assert level_at(session, 0.7) == WHOLE
     session.apply(Measure(False), 0.8)
-    assert scale_at(session, 0.8) == SCALES[-1]
+    assert level_at(session, 0.8) == SMALLER[-1]
     session.apply(Play(False), 0.9)
-    assert scale_at(session, 0.9) == 1
+    assert level_at(session, 0.9) == WHOLE
     session.apply(Seek(3), 1.0)
-    assert scale_at(session, 1.0) == 1
+    assert level_at(session, 1.0) == WHOLE
 
 
 def test_dragging_uses_drafts_until_the_viewpoint_rests() -> None:
     session = slow_session()
-    scale_at(session, 0.0)
+    level_at(session, 0.0)
     for number in range(WINDOW + 1):
         session.apply(Move(Viewpoint(0.0, number / 10)), number / 10)
-        scale = scale_at(session, number / 10)
-    assert scale == SCALES[-1]
+        level = level_at(session, number / 10)
+    assert level == SMALLER[-1]
     now_s = WINDOW / 10
     assert session.next_request(now_s) is None
     assert session.seconds_to_next(now_s) == pytest.approx(MOVING_S)
-    assert scale_at(session, now_s + MOVING_S + 0.01) == 1
+    assert level_at(session, now_s + MOVING_S + 0.01) == WHOLE
     assert session.seconds_to_next(now_s + 1) is None
+
+
+def test_a_whole_picture_is_overtaken_when_the_viewpoint_moves_again() -> None:
+    session = slow_session()
+    level_at(session, 0.0)
+    for number in range(WINDOW + 1):
+        session.apply(Move(Viewpoint(0.0, number / 10)), number / 10)
+        level_at(session, number / 10)
+    whole = session.next_request(1.0)
+    assert whole is not None
+    assert whole.level == WHOLE
+    assert not session.overtaken(whole, 1.1)
+    session.apply(Move(Viewpoint(0.5, 0.5)), 1.1)
+    assert session.overtaken(whole, 1.1)
+    draft = session.next_request(1.1)
+    assert draft is not None
+    assert not session.overtaken(draft, 1.1)
+
+
+def test_nothing_is_overtaken_where_whole_pictures_are_quick_enough() -> None:
+    session = slow_session()
+    request = session.next_request(0.0)
+    assert request is not None
+    session.apply(Move(Viewpoint(0.5, 0.5)), 0.1)
+    assert not session.overtaken(request, 0.1)

@@ -13,9 +13,11 @@ from player_files import SYNTHESIZER, decode_picture, encode, write_original
 from mvcodec.array import Viewpoint
 from mvcodec.evaluation.metrics import psnr
 from mvcodec.frames import DecodedSet, RenderedView
+from mvcodec.player.draft import QUICKER, SMALLER, WHOLE, Level
 from mvcodec.player.picture_maker import PictureMaker
 from mvcodec.player.session import PictureRequest
 from mvcodec.synthesis.layered import Layered
+from mvcodec.synthesis.quick import Quick
 from mvcodec.synthesis.synthesizer import Preparing
 from mvcodec.synthesis.table import make_synthesizer
 
@@ -62,13 +64,13 @@ def maker(file: Path, notes: list[tuple[str, int, Noting]], let: threading.Event
     maker.close()
 
 
-@pytest.mark.parametrize("scale", [1.0, 0.5])
+@pytest.mark.parametrize("level", [WHOLE, SMALLER[-1]])
 def test_the_next_frame_is_prepared_once_and_waited_for(
-    maker: PictureMaker, notes: list[tuple[str, int, Noting]], let: threading.Event, scale: float
+    maker: PictureMaker, notes: list[tuple[str, int, Noting]], let: threading.Event, level: Level
 ) -> None:
-    maker.make(PictureRequest(0, MIDDLE, scale=scale), next_frame=1)
+    maker.make(PictureRequest(0, MIDDLE, level=level), next_frame=1)
     assert [note[:2] for note in notes] == [("rendered", 0)]
-    next_one = threading.Thread(target=maker.make, args=(PictureRequest(1, MIDDLE, scale=scale),))
+    next_one = threading.Thread(target=maker.make, args=(PictureRequest(1, MIDDLE, level=level),))
     next_one.start()
     next_one.join(0.2)
     assert next_one.is_alive()
@@ -94,3 +96,21 @@ def test_the_default_synthesizer_prepares_and_renders_the_same(file: Path) -> No
     expected = Layered().render(decoded, Viewpoint(0.25, 0.75)).pixels
     assert psnr(expected, decode_picture(np.frombuffer(made.jpeg, np.uint8))) > 33
     maker.close()
+
+
+def test_quick_pictures_come_from_the_quick_synthesizer(file: Path) -> None:
+    maker = PictureMaker(file, Layered, Quick)
+    assert maker.levels == QUICKER
+    place = Viewpoint(0.25, 0.75)
+    decoded = maker.store.fetch(1).decoded
+    assert decoded is not None
+    for level, renderer in ((WHOLE, Layered()), (QUICKER[1], Quick())):
+        made = maker.make(PictureRequest(1, place, level=level))
+        assert (made.facts["scale"], made.facts["quick"]) == (1, level.quick)
+        expected = renderer.render(decoded, place).pixels
+        assert psnr(expected, decode_picture(np.frombuffer(made.jpeg, np.uint8))) > 33
+    maker.close()
+
+
+def test_without_a_quick_synthesizer_pictures_only_get_smaller(maker: PictureMaker) -> None:
+    assert maker.levels == SMALLER

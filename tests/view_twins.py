@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.frames import DecodedSet, FloatMap, Mask, Picture
 from mvcodec.synthesis.camera_spread import measure_spread
-from mvcodec.synthesis.layered import FADE, LayeredSettings
+from mvcodec.synthesis.cell_cameras import FADE
+from mvcodec.synthesis.layered import LayeredSettings
 
 UNKNOWN = -1e9
 BORDER = 2

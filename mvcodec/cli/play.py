@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mvcodec.cli.arguments import add_synthesizer
 from mvcodec.errors import MissingExtra
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.table import QUICKER, make_synthesizer
 
 EXTRA = "play"
 PACKAGES = ("starlette", "uvicorn", "websockets")
@@ -48,7 +48,12 @@ def run(arguments: argparse.Namespace) -> None:
     from mvcodec.player.serving import serve
 
     make_synthesizer(arguments.synthesizer)  # a wrong name is told before anything is opened
-    maker = PictureMaker(arguments.input, partial(make_synthesizer, arguments.synthesizer))
+    quicker = QUICKER.get(arguments.synthesizer)
+    maker = PictureMaker(
+        arguments.input,
+        partial(make_synthesizer, arguments.synthesizer),
+        partial(make_synthesizer, quicker) if quicker else None,
+    )
     try:
         if arguments.original is not None:
             maker.originals = Originals(open_input([arguments.original]), maker.store.table.header.array)

@@ -127,9 +127,14 @@ def _outvote(  # type: ignore[no-untyped-def]
             best = mean
             if end == known:  # the last surface has none to defend itself against
                 return best
-            luma = _luma_of(x, y, mean, who[start:end], cameras, lumas, shifts, weights)
             against = np.float32(0)
-            for i in range(cameras.size):
+            voters = cameras.size if denial > 0 else 0
+            luma = (
+                _luma_of(x, y, mean, who[start:end], cameras, lumas, shifts, weights)
+                if voters
+                else np.float32(0)
+            )
+            for i in range(voters):
                 agrees = False
                 for k in range(start, end):
                     agrees |= who[k] == i
@@ -168,7 +173,8 @@ def vote(
         moved: float32 (N, H + 2, W + 2), px, or UNKNOWN; see `splat`.
         cameras: int64 (N,), which of the R real cameras were moved.
         maps: float32 (R, H, W), px, of every real camera.
-        lumas: float32 (R, H + 4, W + 4), grey levels, see `mvcodec.kernels.view_fetch`.
+        lumas: float32 (R, H + 4, W + 4), grey levels, see `mvcodec.kernels.view_fetch`;
+            of any size where denial is 0.
         shifts: float32 (N, 2), px (x, y) from the view to the camera for each px of disparity.
         weights: float32 (N,), of the cameras, above 0.
         out: float32 (H, W), rows first..last-1 overwritten; UNKNOWN where no camera knows.

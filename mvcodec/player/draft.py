@@ -1,9 +1,10 @@
-"""Smaller frame sets, for playing and dragging where whole pictures take too long, and when to use them."""
+"""Drafts, for playing and dragging where whole pictures take too long, and when to use them."""
 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -11,30 +12,63 @@ import numpy as np
 from mvcodec.array import CameraArray
 from mvcodec.frames import DecodedSet, DisparityMap, FloatMap, Picture, RenderedView
 
-SCALES = (1.0, 0.75, 0.5)
-"""Of the picture's sides."""
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """How a picture is made.
+
+    Attributes:
+        scale: of its sides.
+        quick: by the quick synthesizer instead of the chosen one.
+        cost: of making it, about, as a share of a whole picture's.
+    """
+
+    scale: float
+    quick: bool
+    cost: float
+
+
+WHOLE = Level(1.0, quick=False, cost=1.0)
+SMALLER = (WHOLE, Level(0.75, quick=False, cost=0.6), Level(0.5, quick=False, cost=0.3))
+"""Levels of a synthesizer that has no quick one beside it."""
+
+QUICKER = (
+    WHOLE,
+    Level(1.0, quick=True, cost=0.6),
+    Level(0.75, quick=True, cost=0.4),
+    Level(0.5, quick=True, cost=0.25),
+)
+"""Levels of one that has. The costs are those of shop_v4, decoding among them (`benchmarks/playback.py`)."""
 
 BUDGET_S = 0.062
 """For making a picture: 15 a second, with time to hand it over. It is drawn while the next one is made."""
 
+MARGIN = 0.85
+"""Share of the budget that a better level may cost: without room, the level would change all the time."""
+
 WINDOW = 4
-"""Pictures that are averaged before the scale may change."""
+"""Pictures that are averaged before the level may change."""
 
 
 class Pace:
-    """Chooses the scale of pictures from what they cost, so that motion stays smooth."""
+    """Chooses the level of pictures from what they cost, so that motion stays smooth.
 
-    def __init__(self) -> None:
+    Args:
+        levels: from the best to the cheapest.
+    """
+
+    def __init__(self, levels: Sequence[Level]) -> None:
+        self._levels = levels
         self._place = 0
         self._costs_s: deque[float] = deque(maxlen=WINDOW)
 
     @property
-    def scale(self) -> float:
-        """One of SCALES."""
-        return SCALES[self._place]
+    def level(self) -> Level:
+        """The one to make pictures at."""
+        return self._levels[self._place]
 
     def note(self, cost_s: float, allowed_s: float) -> None:
-        """Learn what a picture of the present scale cost.
+        """Learn what a picture of the present level cost.
 
         Args:
             cost_s: seconds from its request to its being sent.
@@ -44,8 +78,11 @@ class Pace:
         if len(self._costs_s) < WINDOW:
             return
         average_s, budget_s = sum(self._costs_s) / WINDOW, max(BUDGET_S, allowed_s)
-        fitting = (i for i, scale in enumerate(SCALES) if average_s * (scale / self.scale) ** 2 <= budget_s)
-        self._place = next(fitting, len(SCALES) - 1)
+        whole_s = average_s / self.level.cost
+        for place, level in enumerate(self._levels):
+            if whole_s * level.cost <= (budget_s if place >= self._place else MARGIN * budget_s):
+                break
+        self._place = place
         self._costs_s.clear()
 
 

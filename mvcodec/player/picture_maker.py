@@ -16,7 +16,7 @@ import cv2
 from mvcodec.array import Viewpoint
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
-from mvcodec.player.draft import in_full_px, shrink
+from mvcodec.player.draft import QUICKER, SMALLER, Level, in_full_px, shrink
 from mvcodec.player.frame_store import Damage, FrameStore
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.originals import Originals
@@ -49,19 +49,28 @@ class PictureMaker:
     Args:
         path: the file.
         make_synthesizer: makes one synthesizer.
+        make_quick: makes one for pictures that move, if there is a quicker one.
 
     Attributes:
         store: the file's frame sets.
+        levels: at which pictures can be made.
         originals: to measure against; None at first.
 
     Raises:
         InputError, StreamError: as `FrameStore`.
     """
 
-    def __init__(self, path: Path, make_synthesizer: Callable[[], Synthesizer]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        make_synthesizer: Callable[[], Synthesizer],
+        make_quick: Callable[[], Synthesizer] | None = None,
+    ) -> None:
         self.store = FrameStore(path)
         self.originals: Originals | None = None
+        self.levels = SMALLER if make_quick is None else QUICKER
         self._synthesizers = SynthesizerPool(make_synthesizer, WORKERS + 1)
+        self._quick = SynthesizerPool(make_quick or make_synthesizer, WORKERS + 1)
         self._drafts = _Drafts()
         self._ahead = ThreadPoolExecutor(1, "ahead")
         self._coming: tuple[int, Future[None]] | None = None
@@ -84,9 +93,9 @@ class PictureMaker:
         if next_frame is not None:
             self._begin(replace(request, frame=next_frame))
         start = time.perf_counter()
-        decoded, look = self._drafts.of(stored.decoded, request.scale), LOOKS[request.look]
+        decoded, look = self._drafts.of(stored.decoded, request.level.scale), LOOKS[request.look]
         viewpoints = look.place(decoded.array, request.viewpoint, request.eye_steps)
-        views = [in_full_px(view, request.scale) for view in self._render(decoded, viewpoints)]
+        views = self._render(decoded, viewpoints, request.level)
         rendered = time.perf_counter()
         picture, legend = look.compose(
             replace(decoded, disparity_range_px=stored.decoded.disparity_range_px), views
@@ -100,7 +109,8 @@ class PictureMaker:
             "row": request.viewpoint.row,
             "col": request.viewpoint.col,
             "look": request.look,
-            "scale": request.scale,
+            "scale": request.level.scale,
+            "quick": request.level.quick,
             "legend": legend or None,
             "decode_ms": round(stored.decode_ms, 2),
             "synthesis_ms": round(1000 * (rendered - start), 2),
@@ -115,9 +125,15 @@ class PictureMaker:
         self._ahead.shutdown(cancel_futures=True)
         self.store.close()
 
-    def _render(self, decoded: DecodedSet, viewpoints: tuple[Viewpoint, ...]) -> list[RenderedView]:
-        with self._synthesizers.borrow(decoded) as synthesizer:
-            return [synthesizer.render(decoded, viewpoint) for viewpoint in viewpoints]
+    def _render(
+        self, decoded: DecodedSet, viewpoints: tuple[Viewpoint, ...], level: Level
+    ) -> list[RenderedView]:
+        with self._pool_of(level).borrow(decoded) as synthesizer:
+            views = [synthesizer.render(decoded, viewpoint) for viewpoint in viewpoints]
+        return [in_full_px(view, level.scale) for view in views]
+
+    def _pool_of(self, level: Level) -> SynthesizerPool:
+        return self._quick if level.quick else self._synthesizers
 
     def _begin(self, request: PictureRequest) -> None:
         # One at a time: with many viewers it is a help to none if it queues up.
@@ -129,8 +145,8 @@ class PictureMaker:
         stored = self.store.fetch(request.frame)
         if stored.decoded is None:
             return
-        decoded = self._drafts.of(stored.decoded, request.scale)
-        with self._synthesizers.borrow(decoded) as synthesizer:
+        decoded = self._drafts.of(stored.decoded, request.level.scale)
+        with self._pool_of(request.level).borrow(decoded) as synthesizer:
             if isinstance(synthesizer, Preparing):
                 synthesizer.prepare(decoded, request.viewpoint)
 

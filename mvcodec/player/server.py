@@ -26,7 +26,7 @@ from mvcodec.player.access import AccessRules
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.messages import parse_message
 from mvcodec.player.picture_maker import WORKERS, MadePicture, PictureMaker
-from mvcodec.player.session import Session
+from mvcodec.player.session import PictureRequest, Session
 
 MAX_VIEWERS = 32
 
@@ -150,9 +150,15 @@ class _Viewer:
     def __init__(self, socket: WebSocket, broadcast: Broadcast, pool: ThreadPoolExecutor) -> None:
         self._socket, self._broadcast, self._pool = socket, broadcast, pool
         table = broadcast.maker.store.table
-        self._session = Session(table.header.array, table.count, stop_on_damage=broadcast.stop_on_damage)
+        self._session = Session(
+            table.header.array,
+            table.count,
+            stop_on_damage=broadcast.stop_on_damage,
+            levels=broadcast.maker.levels,
+        )
         self._news = asyncio.Event()
         self._stated: dict[str, Any] | None = None
+        self._overtaken: asyncio.Future[MadePicture] | None = None
 
     async def run(self) -> None:
         sender = asyncio.create_task(self._send())
@@ -188,7 +194,7 @@ class _Viewer:
 
     async def _send(self) -> None:
         await self._socket.send_text(json.dumps(self._greeting()))
-        session, loop = self._session, asyncio.get_running_loop()
+        session = self._session
         while True:
             self._news.clear()
             request = session.next_request(time.monotonic())
@@ -198,16 +204,34 @@ class _Viewer:
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._news.wait(), wait_s)
                 continue
-            make, start_s = self._broadcast.maker.make, time.monotonic()
+            start_s = time.monotonic()
             try:
-                made = await loop.run_in_executor(self._pool, make, request, session.next_frame())
+                made = await self._make(request)
             except MvCodecError as error:
                 trouble = {"type": "trouble", "message": str(error), "frame": request.frame}
                 await self._socket.send_text(json.dumps(trouble))
                 continue
+            if made is None:
+                continue
             now_s = time.monotonic()
             session.made(request, now_s - start_s, now_s)
             await self._send_picture(made)
+
+    async def _make(self, request: PictureRequest) -> MadePicture | None:
+        """Have a picture made; None if it was overtaken, which one at a time may be."""
+        maker, loop = self._broadcast.maker, asyncio.get_running_loop()
+        job = loop.run_in_executor(self._pool, maker.make, request, self._session.next_frame())
+        while not job.done():
+            news = asyncio.create_task(self._news.wait())
+            await asyncio.wait((job, news), return_when=asyncio.FIRST_COMPLETED)
+            news.cancel()
+            self._news.clear()
+            free = self._overtaken is None or self._overtaken.done()
+            if free and not job.done() and self._session.overtaken(request, time.monotonic()):
+                job.add_done_callback(asyncio.Future.exception)  # nobody asks any more what became of it
+                self._overtaken = job
+                return None
+        return await job
 
     async def _send_picture(self, made: MadePicture) -> None:
         """A picture's message: big-endian uint32 length of the facts, the facts as JSON, the JPEG."""

@@ -7,12 +7,13 @@ at most `MAX_IN_FLIGHT` pictures wait to be drawn, so that nothing can queue up.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.player.clock import PlayClock
-from mvcodec.player.draft import Pace
+from mvcodec.player.draft import SMALLER, WHOLE, Level, Pace
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.messages import (
     Eyes,
@@ -45,7 +46,7 @@ class PictureRequest:
         look: a name of LOOKS.
         eye_steps: distance of two eyes in steps of the grid; 0 where the look is for one.
         measure: against the original.
-        scale: of the picture's sides, one of draft.SCALES.
+        level: how it is made.
     """
 
     frame: int
@@ -53,7 +54,7 @@ class PictureRequest:
     look: str = "picture"
     eye_steps: float = 0.0
     measure: bool = False
-    scale: float = 1.0
+    level: Level = WHOLE
 
 
 class Session:
@@ -63,9 +64,17 @@ class Session:
         array: the geometry; viewpoints are kept within it.
         frame_count: of the file.
         stop_on_damage: playback stops at a damaged frame instead of going on behind it.
+        levels: at which pictures can be made, from the best to the cheapest.
     """
 
-    def __init__(self, array: CameraArray, frame_count: int, *, stop_on_damage: bool = False) -> None:
+    def __init__(
+        self,
+        array: CameraArray,
+        frame_count: int,
+        *,
+        stop_on_damage: bool = False,
+        levels: Sequence[Level] = SMALLER,
+    ) -> None:
         self._array = array
         self._stop_on_damage = stop_on_damage
         self._clock = PlayClock(frame_count, array.fps)
@@ -76,7 +85,7 @@ class Session:
         self._ready = False
         self._sent = 0
         self._in_flight: dict[int, float] = {}
-        self._pace = Pace()
+        self._pace = Pace(levels)
         self._moved_s = -math.inf
         self.transfer_ms: float | None = None
 
@@ -128,7 +137,7 @@ class Session:
         request = replace(self._wanted, frame=self._clock.advance(now_s), eye_steps=eye_steps)
         # A picture that stands, or that is measured, is never a draft.
         if (self._clock.playing or self._moving(now_s)) and not request.measure:
-            request = replace(request, scale=self._pace.scale)
+            request = replace(request, level=self._pace.level)
         if request == self._last:
             return None
         self._last = request
@@ -144,14 +153,18 @@ class Session:
         """How long until `next_request` may have news without a message; None: not before one."""
         if not self._ready or len(self._in_flight) >= MAX_IN_FLIGHT:
             return None
-        if self._clock.playing or self._last is None or self._last.scale == 1:
+        if self._clock.playing or self._last is None or self._last.level == WHOLE:
             return self._clock.seconds_to_next(now_s)
         return max(0.0, self._moved_s + MOVING_S - now_s)  # then the whole picture follows
 
+    def overtaken(self, request: PictureRequest, now_s: float) -> bool:
+        """Whether a picture being made is not worth waiting for: a whole one, and the viewpoint moves."""
+        return request.level == WHOLE != self._pace.level and self._moving(now_s)
+
     def made(self, request: PictureRequest, cost_s: float, now_s: float) -> None:
-        """Note what a picture cost, which decides the scale of the next ones."""
+        """Note what a picture cost, which decides the level of the next ones."""
         moving = self._moving(now_s)
-        if request.scale == self._pace.scale and (moving or self._clock.playing):
+        if request.level == self._pace.level and (moving or self._clock.playing):
             self._pace.note(cost_s, 0.0 if moving else 1 / (self._array.fps * self._clock.speed))
 
     def sent(self, now_s: float, *, damaged: bool = False) -> int:

@@ -9,24 +9,22 @@ meet there, and what no camera saw is filled from the background side.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvcodec.array import CameraArray, Cell, Position, Viewpoint
+from mvcodec.array import Position, Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, FloatMap, Picture, RenderedView
+from mvcodec.synthesis.bands import make_pool, run_in_bands
 from mvcodec.synthesis.camera_spread import measure_spread
-
-THREADS = 2
-FADE = 0.25
-"""Cells over which a camera fades out before a border that it does not stand on."""
+from mvcodec.synthesis.cell_cameras import CellCameras, find_cameras, real_view
+from mvcodec.synthesis.view_disparity import Ballot, view_disparity
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,14 +97,13 @@ class _Sources:
         self._ready: set[Position] = set()
         self._lock = threading.Lock()
 
-    def indices(self, cameras: Sequence[Position], tolerance_px: float, pool: Executor) -> NDArray[np.int64]:
-        """Prepare these cameras, side by side; their places in the arrays."""
+    def prepare(self, cameras: Sequence[Position], tolerance_px: float, pool: Executor) -> None:
+        """Make these cameras ready, side by side."""
         with self._lock:
             missing = [camera for camera in cameras if camera not in self._ready]
             for _ in pool.map(partial(self._prepare, tolerance_px=tolerance_px), missing):
                 pass
             self._ready.update(missing)
-        return np.array([self.decoded.array.real.index(camera) for camera in cameras])
 
     def _prepare(self, camera: Position, tolerance_px: float) -> None:
         from mvcodec.kernels.view_planes import mark_contours, split_luma
@@ -132,134 +129,69 @@ def _contours(disparity: FloatMap, tolerance_px: float) -> NDArray[np.uint8]:
     return (nearest - farthest > tolerance_px).view(np.uint8)
 
 
-def _weight(array: CameraArray, cell: Cell, camera: Position, viewpoint: Viewpoint, spread: float) -> float:
-    """How much a camera of the cell counts, by its distance.
-
-    Towards a border to another cell the cameras across this cell fade out, so that the picture
-    does not jump where other cameras take over.
-    """
-    across = abs(viewpoint.col - camera[1]) / array.col_step if array.col_step else 0.0
-    down = abs(viewpoint.row - camera[0]) / array.row_step if array.row_step else 0.0
-    weight = 1 / (spread + across**2 + down**2)
-    if camera[1] == cell.left and cell.right < array.cols - 1:
-        weight *= min(1.0, (1 - across) / FADE)
-    if camera[1] == cell.right and cell.left > 0:
-        weight *= min(1.0, (1 - across) / FADE)
-    if camera[0] == cell.top and cell.bottom < array.rows - 1:
-        weight *= min(1.0, (1 - down) / FADE)
-    if camera[0] == cell.bottom and cell.top > 0:
-        weight *= min(1.0, (1 - down) / FADE)
-    return weight
-
-
 class Layered:
     """The `layered` synthesizer. Thread-safe; keeps what it prepared for the last decoded set."""
 
     def __init__(self, settings: LayeredSettings | None = None) -> None:
         self.settings = settings or LayeredSettings()
-        self._pool = ThreadPoolExecutor(THREADS, "layered")
+        self._ballot = Ballot(
+            self.settings.tolerance_px,
+            self.settings.ratio,
+            self.settings.contrast,
+            self.settings.denial,
+            self.settings.reach_px,
+        )
+        self._pool = make_pool("layered")
         self._lock = threading.Lock()
         self._sources: _Sources | None = None
 
     def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
         """See `Synthesizer.render`. `seen_by` counts the cameras that agree on the pixel's surface."""
-        decoded.array.cell_at(viewpoint)  # outside the array it raises
-        position = viewpoint.position
-        if position is not None and position in decoded.pictures:
-            pixels = decoded.pictures[position]
-            own = decoded.disparities[position].values_px
-            return RenderedView(viewpoint, pixels.copy(), own.copy(), np.ones(own.shape, np.uint8))
-        sources, places, shifts, weight = self._cameras(decoded, viewpoint)
-        disparity = self._view_disparity(sources, places, shifts, weight)
-        pixels, seen_by = self._colour(sources, places, shifts, weight, disparity)
+        own = real_view(decoded, viewpoint)
+        if own is not None:
+            return own
+        sources, cameras = self._prepared(decoded, viewpoint)
+        disparity = view_disparity(
+            sources.disparities,
+            sources.lumas,
+            cameras,
+            self._ballot,
+            decoded.disparity_range_px[0],
+            self._pool,
+        )
+        pixels, seen_by = self._colour(sources, cameras, disparity)
         return RenderedView(viewpoint, pixels, disparity, seen_by)
 
     def prepare(self, decoded: DecodedSet, viewpoint: Viewpoint) -> None:
         """See `Preparing.prepare`."""
-        self._cameras(decoded, viewpoint)
+        self._prepared(decoded, viewpoint)
 
-    def _cameras(
-        self, decoded: DecodedSet, viewpoint: Viewpoint
-    ) -> tuple[_Sources, NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
-        """The cameras that see a view, prepared: their places in the sources, shifts and weights."""
-        array = decoded.array
-        cell = array.cell_at(viewpoint)
-        sources = self._prepared(decoded)
-        weights = {camera: _weight(array, cell, camera, viewpoint, sources.spread) for camera in cell.cameras}
-        cameras = [camera for camera in cell.cameras if weights[camera] > 0 and camera in decoded.pictures]
-        if not cameras:
-            raise SettingError("decoded.pictures", "no camera of the view's cell", "at least one")
-        shifts = np.array([array.shift_per_disparity(camera, viewpoint) for camera in cameras], np.float32)
-        weight = np.array([weights[camera] for camera in cameras], np.float32)
-        places = sources.indices(cameras, self.settings.tolerance_px, self._pool)
-        return sources, places, shifts, weight
-
-    def _prepared(self, decoded: DecodedSet) -> _Sources:
+    def _prepared(self, decoded: DecodedSet, viewpoint: Viewpoint) -> tuple[_Sources, CellCameras]:
+        """The cameras that see a view, and the sources with these prepared."""
         with self._lock:
             if self._sources is None or self._sources.decoded is not decoded:
                 self._sources = _Sources(decoded, self.settings.spread)
-            return self._sources
-
-    def _view_disparity(
-        self,
-        sources: _Sources,
-        places: NDArray[np.int64],
-        shifts: NDArray[np.float32],
-        weights: NDArray[np.float32],
-    ) -> FloatMap:
-        from mvcodec.kernels import view_depth
-
-        settings = self.settings
-        _, height, width = sources.disparities.shape
-        moved = np.empty((len(places), height + 2, width + 2), np.float32)
-        jobs = [
-            self._pool.submit(
-                view_depth.splat, sources.disparities[place], shift[0], shift[1], settings.reach_px, out
-            )
-            for place, shift, out in zip(places, shifts, moved, strict=True)
-        ]
-        for job in jobs:
-            job.result()
-        voted = np.empty((height, width), np.float32)
-        self._bands(
-            height,
-            view_depth.vote,
-            moved,
-            places,
-            sources.disparities,
-            sources.lumas,
-            shifts,
-            weights,
-            settings.tolerance_px,
-            settings.contrast,
-            settings.ratio,
-            settings.denial,
-            voted,
-        )
-        cleaned = np.asarray(cv2.medianBlur(voted, 3), np.float32)
-        self._bands(height, view_depth.fill_background, cleaned, sources.decoded.disparity_range_px[0])
-        return cleaned
+            sources = self._sources
+        cameras = find_cameras(decoded, viewpoint, sources.spread)
+        sources.prepare(cameras.cameras, self.settings.tolerance_px, self._pool)
+        return sources, cameras
 
     def _colour(
-        self,
-        sources: _Sources,
-        places: NDArray[np.int64],
-        shifts: NDArray[np.float32],
-        weights: NDArray[np.float32],
-        disparity: FloatMap,
+        self, sources: _Sources, cameras: CellCameras, disparity: FloatMap
     ) -> tuple[Picture, NDArray[np.uint8]]:
         from mvcodec.kernels import view_colour, view_holes
 
         settings = self.settings
         pixels: Picture = np.empty((*disparity.shape, 3), np.uint8)
         seen_by = np.empty(disparity.shape, np.uint8)
-        self._bands(
+        run_in_bands(
+            self._pool,
             disparity.shape[0],
             view_colour.blend,
-            places,
+            cameras.places,
             sources.planes,
-            shifts,
-            weights,
+            cameras.shifts,
+            cameras.weights,
             disparity,
             _contours(disparity, settings.tolerance_px),
             settings.tolerance_px,
@@ -270,10 +202,3 @@ class Layered:
         )
         view_holes.paint_holes(pixels, disparity, seen_by, settings.tolerance_px, settings.hole_reach_px)
         return pixels, seen_by
-
-    def _bands(self, height: int, kernel: Callable[..., None], *arguments: object) -> None:
-        """Run a kernel over bands of rows, one a thread."""
-        edges = [height * band // THREADS for band in range(THREADS + 1)]
-        jobs = [self._pool.submit(kernel, *arguments, first, last) for first, last in pairwise(edges)]
-        for job in jobs:
-            job.result()

@@ -8,13 +8,18 @@ from mvcodec.errors import SettingError
 from mvcodec.synthesis.dils import Dils
 from mvcodec.synthesis.layered import Layered
 from mvcodec.synthesis.linear import Linear
+from mvcodec.synthesis.quick import Quick
 from mvcodec.synthesis.synthesizer import Synthesizer
 
 SYNTHESIZERS: dict[str, Callable[[], Synthesizer]] = {
     "layered": Layered,
+    "quick": Quick,
     "dils": Dils,
     "linear": Linear,
 }
+
+QUICKER = {"layered": "quick"}
+"""What stands in for a synthesizer where it would be too slow, as while the viewpoint moves."""
 
 
 def make_synthesizer(name: str) -> Synthesizer:

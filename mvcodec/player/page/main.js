@@ -274,7 +274,8 @@ class Player {
     this.showQuality(shown.quality);
     this.showDamage(shown);
     this.link.write({ ...shown, eyes: wanted.eyes }, STEREO.includes(shown.look));
-    Object.assign(document.body.dataset, { look: shown.look, frame: shown.frame, row: shown.row, col: shown.col, scale: shown.scale });
+    const { look, frame, row, col, scale, quick } = shown;
+    Object.assign(document.body.dataset, { look, frame, row, col, scale, quick });
   }
 
   showQuality(quality) {

@@ -1,0 +1,149 @@
+"""Colour at a virtual view at the least cost, for pictures that move: linear fetch, in whole numbers.
+
+A pixel is one 64-bit number of four lanes of 16 bits: red, green, blue, and 1 in the uppermost. So one
+multiplication weighs all of them, and the last lane comes out as the sum of the weights.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FloatMap = NDArray[np.float32]
+
+STEPS = 16
+"""Places between two pixels that a fetch tells apart. The products of both axes fill a lane's upper byte."""
+WEIGHTS = 256
+"""The weights of a view's cameras may sum up to this, so that no lane overflows."""
+LANES = np.uint64(0x00FF00FF00FF00FF)
+HALVES = np.uint64(0x0080008000800080)
+
+
+@njit(cache=True, nogil=True)
+def pack(picture: NDArray[np.uint8], out: NDArray[np.uint64]) -> None:
+    """RGB to lanes.
+
+    Args:
+        picture: uint8 (H, W, 3).
+        out: uint64 (H + 1, W + 1), overwritten; its last row and column repeat the picture's.
+    """
+    height, width, _ = picture.shape
+    for y in range(height):
+        for x in range(width):
+            red, green = np.uint64(picture[y, x, 0]), np.uint64(picture[y, x, 1])
+            blue, one = np.uint64(picture[y, x, 2]), np.uint64(1)
+            out[y, x] = red | (green << np.uint64(16)) | (blue << np.uint64(32)) | (one << np.uint64(48))
+        out[y, width] = out[y, width - 1]
+    out[height] = out[height - 1]
+
+
+@njit(cache=True, nogil=True)
+def _locate(y, disparity, shift, shape, places, nearest, parts):  # type: ignore[no-untyped-def]
+    """Where a camera sees one row of the view: flat index up left of there in its packed picture, -1 outside,
+    flat index of the nearest pixel in its map, and the fractions in STEPS."""
+    height, width = shape
+    shift_x, shift_y = shift
+    steps, half, one = np.int32(STEPS), np.int32(STEPS // 2), np.float32(STEPS)
+    for x in range(width):
+        at_x = np.float32(x) + shift_x * disparity[x]
+        at_y = np.float32(y) + shift_y * disparity[x]
+        inside = (
+            (at_x > np.float32(-0.5))
+            & (at_y > np.float32(-0.5))
+            & (at_x < np.float32(width - 0.5))
+            & (at_y < np.float32(height - 0.5))
+        )
+        at_x = min(max(at_x, np.float32(0)), np.float32(width - 1))
+        at_y = min(max(at_y, np.float32(0)), np.float32(height - 1))
+        fine_x = np.int32(at_x * one + np.float32(0.5))
+        fine_y = np.int32(at_y * one + np.float32(0.5))
+        left, top = fine_x // steps, fine_y // steps
+        parts[0, x], parts[1, x] = fine_x % steps, fine_y % steps
+        nearest[x] = (fine_y + half) // steps * np.int32(width) + (fine_x + half) // steps
+        places[x] = top * np.int32(width + 1) + left if inside else np.int32(-1)
+
+
+@njit(cache=True, nogil=True)
+def _add(packed, own, weight, disparity, tolerance, stride, located, lanes, seen):  # type: ignore[no-untyped-def]
+    """Add what a camera sees of one row of the view, by its weight."""
+    places, nearest, parts = located
+    one, below = np.uintp(1), np.uintp(stride)
+    for x in range(disparity.size):
+        if places[x] < 0 or abs(own[np.uintp(nearest[x])] - disparity[x]) > tolerance:
+            continue
+        place = np.uintp(places[x])
+        right, down = np.uint64(parts[0, x]), np.uint64(parts[1, x])
+        both = right * down
+        right, down = right * np.uint64(STEPS), down * np.uint64(STEPS)
+        fetched = (
+            packed[place] * (np.uint64(STEPS * STEPS) + both - right - down)
+            + packed[place + one] * (right - both)
+            + packed[place + below] * (down - both)
+            + packed[place + below + one] * both
+        )
+        lanes[x] += (((fetched + HALVES) >> np.uint64(8)) & LANES) * weight
+        seen[x] += 1
+
+
+@njit(cache=True, nogil=True)
+def blend(
+    cameras: NDArray[np.int64],
+    packed: NDArray[np.uint64],
+    maps: NDArray[np.float32],
+    shifts: NDArray[np.float32],
+    weights: NDArray[np.uint64],
+    view_disparity: FloatMap,
+    tolerance: float,
+    out: NDArray[np.uint8],
+    seen_by: NDArray[np.uint8],
+    first: int,
+    last: int,
+) -> None:
+    """Colour of a view from every camera that sees each pixel, rows first..last-1.
+
+    A camera counts where its own disparity at the pixel nearest to the place agrees. Places are rounded to
+    1 / STEPS px, what each camera contributes to whole grey levels.
+
+    Args:
+        cameras: int64 (N,), which of the R real cameras see the view.
+        packed: uint64 (R, H + 1, W + 1), see `pack`.
+        maps: float32 (R, H, W), px, of every real camera.
+        shifts: float32 (N, 2), px (x, y) from the view to the camera for each px of disparity.
+        weights: uint64 (N,), above 0, in all at most WEIGHTS.
+        view_disparity: float32 (H, W), known everywhere.
+        tolerance: px within which disparities are one surface.
+        out: uint8 (H, W, 3) RGB, rows first..last-1 overwritten; black where no camera sees the pixel.
+        seen_by: uint8 (H, W), overwritten with the number of cameras; 0 where none sees the pixel.
+    """
+    height, width = view_disparity.shape
+    pixels, own = packed.ravel(), maps.ravel()
+    plane, plane_map = (height + 1) * (width + 1), height * width
+    near, lane = np.float32(tolerance), np.uint64(0xFFFF)
+    places, nearest = np.empty(width, np.int32), np.empty(width, np.int32)
+    parts, lanes = np.empty((2, width), np.int32), np.empty(width, np.uint64)
+    for y in range(first, last):
+        disparity, seen = view_disparity[y], seen_by[y]
+        lanes[:] = 0
+        seen[:] = 0
+        for i in range(cameras.size):
+            camera = cameras[i]
+            shift = shifts[i, 0], shifts[i, 1]
+            _locate(y, disparity, shift, (height, width), places, nearest, parts)
+            _add(
+                pixels[camera * plane : (camera + 1) * plane],
+                own[camera * plane_map : (camera + 1) * plane_map],
+                weights[i],
+                disparity,
+                near,
+                width + 1,
+                (places, nearest, parts),
+                lanes,
+                seen,
+            )
+        for x in range(width):
+            colour = lanes[x]
+            scale = np.float32(1) / np.float32(max(colour >> np.uint64(48), np.uint64(1)))
+            for channel in range(3):
+                value = np.float32((colour >> np.uint64(16 * channel)) & lane)
+                out[y, x, channel] = np.uint8(value * scale + np.float32(0.5))

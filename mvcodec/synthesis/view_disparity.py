@@ -1,0 +1,77 @@
+"""Disparity at a view: the maps of its cameras moved there, put to the vote, cleaned and filled."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mvcodec.frames import FloatMap
+from mvcodec.synthesis.bands import run_in_bands
+from mvcodec.synthesis.cell_cameras import CellCameras
+
+
+@dataclass(frozen=True, slots=True)
+class Ballot:
+    """How the vote is held; the fields are those of `LayeredSettings`."""
+
+    tolerance_px: float
+    ratio: float
+    contrast: float
+    denial: float
+    reach_px: float
+
+
+def view_disparity(
+    maps: NDArray[np.float32],
+    lumas: NDArray[np.float32],
+    seen: CellCameras,
+    ballot: Ballot,
+    background_px: float,
+    pool: Executor,
+) -> FloatMap:
+    """Disparity of every pixel of a view.
+
+    Args:
+        maps: float32 (R, H, W), px, of every real camera.
+        lumas: float32 (R, H + 4, W + 4), see `mvcodec.kernels.view_fetch`; not looked at where nothing
+            may be denied.
+        background_px: disparity of rows of which no camera knows anything.
+        pool: threads to work in.
+
+    Returns:
+        float32 (H, W), px, known everywhere.
+    """
+    from mvcodec.kernels import view_depth
+
+    _, height, width = maps.shape
+    moved = np.empty((len(seen.places), height + 2, width + 2), np.float32)
+    jobs = [
+        pool.submit(view_depth.splat, maps[place], shift[0], shift[1], ballot.reach_px, out)
+        for place, shift, out in zip(seen.places, seen.shifts, moved, strict=True)
+    ]
+    for job in jobs:
+        job.result()
+    voted = np.empty((height, width), np.float32)
+    run_in_bands(
+        pool,
+        height,
+        view_depth.vote,
+        moved,
+        seen.places,
+        maps,
+        lumas,
+        seen.shifts,
+        seen.weights,
+        ballot.tolerance_px,
+        ballot.contrast,
+        ballot.ratio,
+        ballot.denial,
+        voted,
+    )
+    cleaned = np.asarray(cv2.medianBlur(voted, 3), np.float32)
+    run_in_bands(pool, height, view_depth.fill_background, cleaned, background_px)
+    return cleaned
