@@ -38,9 +38,9 @@ def test_whole_frame_sets_are_left_alone() -> None:
     assert shrink(decoded, 1.0) is decoded
 
 
-def steady(pace: Pace, cost_s: float, allowed_s: float = 0.0) -> None:
+def steady(pace: Pace, drawing_s: float, allowed_s: float = 0.0, wait_s: float = 0.0) -> None:
     for _ in range(WINDOW):
-        pace.note(cost_s, allowed_s)
+        pace.note(wait_s + drawing_s, drawing_s, allowed_s)
 
 
 @pytest.mark.parametrize("levels", [SMALLER, QUICKER])
@@ -77,6 +77,16 @@ def test_levels_are_ordered() -> None:
         assert sorted(levels, key=lambda level: -level.scale) == list(levels)
 
 
+def test_waiting_for_frames_is_not_shortened_by_smaller_pictures() -> None:
+    pace = Pace(SMALLER)
+    steady(pace, 0.7 * BUDGET_S, wait_s=0.5 * BUDGET_S)
+    assert pace.level is SMALLER[1]
+    steady(pace, 0.7 * SMALLER[1].cost * BUDGET_S, wait_s=0.5 * BUDGET_S)
+    assert pace.level is SMALLER[1]
+    steady(pace, 0.7 * SMALLER[1].cost * BUDGET_S)
+    assert pace.level is WHOLE
+
+
 def test_slow_frames_have_more_time() -> None:
     pace = Pace(SMALLER)
     steady(pace, 1.5 * BUDGET_S, allowed_s=2 * BUDGET_S)
@@ -94,7 +104,7 @@ def slow_session(*messages: Message) -> Session:
 def level_at(session: Session, now_s: float) -> Level:
     request = session.next_request(now_s)
     assert request is not None
-    session.made(request, 0.2, now_s)
+    session.made(request, 0.2, 0.2, now_s)
     return request.level
 
 

@@ -68,7 +68,7 @@ def maker(file: Path, notes: list[tuple[str, int, Noting]], let: threading.Event
 def test_the_next_frame_is_prepared_once_and_waited_for(
     maker: PictureMaker, notes: list[tuple[str, int, Noting]], let: threading.Event, level: Level
 ) -> None:
-    maker.make(PictureRequest(0, MIDDLE, level=level), next_frame=1)
+    maker.make(PictureRequest(0, MIDDLE, level=level), upcoming=(1,))
     assert [note[:2] for note in notes] == [("rendered", 0)]
     next_one = threading.Thread(target=maker.make, args=(PictureRequest(1, MIDDLE, level=level),))
     next_one.start()
@@ -81,7 +81,7 @@ def test_the_next_frame_is_prepared_once_and_waited_for(
 
 
 def test_another_frame_than_expected_does_not_wait(maker: PictureMaker) -> None:
-    maker.make(PictureRequest(0, MIDDLE), next_frame=2)
+    maker.make(PictureRequest(0, MIDDLE), upcoming=(2,))
     made = maker.make(PictureRequest(1, MIDDLE))
     assert made.facts["frame"] == 1
 
@@ -89,7 +89,7 @@ def test_another_frame_than_expected_does_not_wait(maker: PictureMaker) -> None:
 def test_the_default_synthesizer_prepares_and_renders_the_same(file: Path) -> None:
     assert isinstance(Layered(), Preparing)
     maker = PictureMaker(file, Layered)
-    maker.make(PictureRequest(0, MIDDLE), next_frame=1)
+    maker.make(PictureRequest(0, MIDDLE), upcoming=(1,))
     made = maker.make(PictureRequest(1, Viewpoint(0.25, 0.75)))
     decoded = maker.store.fetch(1).decoded
     assert decoded is not None

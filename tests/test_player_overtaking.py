@@ -7,7 +7,7 @@ import json
 import struct
 import threading
 import time
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +31,14 @@ class SlowMaker(PictureMaker):
         super().__init__(path, Linear)
         self.held, self.let, self.begun = threading.Event(), threading.Event(), threading.Event()
 
-    def make(self, request: PictureRequest, next_frame: int | None = None) -> MadePicture:
-        assert next_frame is None
+    def make(self, request: PictureRequest, upcoming: Sequence[int] = ()) -> MadePicture:
+        assert not upcoming
         time.sleep(2 * BUDGET_S)
         if self.held.is_set() and request.level == WHOLE:
             self.begun.set()
             self.let.wait(PATIENCE_S)
         facts = {"col": request.viewpoint.col, "whole": request.level == WHOLE}
-        return MadePicture(b"", facts, damaged=False)
+        return MadePicture(b"", facts, 2 * BUDGET_S, damaged=False)
 
 
 @pytest.fixture

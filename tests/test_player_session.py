@@ -118,17 +118,17 @@ def test_a_late_picture_drops_frames() -> None:
     assert session.dropped == 1
 
 
-def test_the_next_frame_is_expected_as_far_on_as_the_last_one_came() -> None:
+def test_the_next_frame_is_expected_as_far_on_as_the_last_one_came_and_some_behind_it() -> None:
     session = ready(Play(True))
     request(session, 0.0)
-    assert session.next_frame() == 1
+    assert session.upcoming() == (1, 2, 3)
     request(session, 0.2)
-    assert session.next_frame() == 4
+    assert session.upcoming() == (4, 5, 6)
     session.apply(Seek(COUNT - 2), 0.2)
     request(session, 0.2)
-    assert session.next_frame() == COUNT - 1
+    assert session.upcoming() == (COUNT - 1,)
     request(session, 0.3)
-    assert session.next_frame() is None
+    assert session.upcoming() == ()
 
 
 def test_the_clock_waits_for_a_decoder_that_is_far_behind() -> None:
@@ -147,7 +147,7 @@ def test_playback_ends_or_loops_at_the_last_frame() -> None:
     assert request(session, 1.0).frame == 0
     session = ready(Seek(COUNT - 2), Loop(True), Play(True))
     request(session, 0.0)
-    assert session.next_frame() == COUNT - 1
+    assert session.upcoming() == (COUNT - 1, 0, 1)
     assert request(session, 0.2).frame == 0
     assert session.state["playing"]
 

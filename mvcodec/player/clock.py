@@ -91,11 +91,16 @@ class PlayClock:
         self._frame = (self._frame + steps) % self._count
         return self._frame
 
-    def following(self, frame: int) -> int | None:
-        """The frame that will be due after this one, if as many are dropped as last; None after the last."""
+    def following(self, frame: int, ahead: int) -> tuple[int, ...]:
+        """The frame that will be due after this one, if as many are dropped as last, and those behind it.
+
+        Args:
+            ahead: how many at most; fewer before the end.
+        """
         if self.loop:
-            return (frame + self._stride) % self._count
-        return min(frame + self._stride, self._count - 1) if frame + 1 < self._count else None
+            return tuple((frame + self._stride + i) % self._count for i in range(min(ahead, self._count)))
+        first = min(frame + self._stride, self._count - 1)
+        return tuple(range(first, min(first + ahead, self._count))) if frame + 1 < self._count else ()
 
     def seconds_to_next(self, now_s: float) -> float | None:
         """How long until another frame is due; None while paused."""

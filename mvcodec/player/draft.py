@@ -20,7 +20,7 @@ class Level:
     Attributes:
         scale: of its sides.
         quick: by the quick synthesizer instead of the chosen one.
-        cost: of making it, about, as a share of a whole picture's.
+        cost: of drawing it, about, as a share of a whole picture's.
     """
 
     scale: float
@@ -34,11 +34,11 @@ SMALLER = (WHOLE, Level(0.75, quick=False, cost=0.6), Level(0.5, quick=False, co
 
 QUICKER = (
     WHOLE,
-    Level(1.0, quick=True, cost=0.6),
-    Level(0.75, quick=True, cost=0.4),
-    Level(0.5, quick=True, cost=0.25),
+    Level(1.0, quick=True, cost=0.55),
+    Level(0.75, quick=True, cost=0.35),
+    Level(0.5, quick=True, cost=0.2),
 )
-"""Levels of one that has. The costs are those of shop_v4, decoding among them (`benchmarks/playback.py`)."""
+"""Levels of one that has; the costs are those on shop_v4."""
 
 BUDGET_S = 0.062
 """For making a picture: 15 a second, with time to hand it over. It is drawn while the next one is made."""
@@ -60,30 +60,34 @@ class Pace:
     def __init__(self, levels: Sequence[Level]) -> None:
         self._levels = levels
         self._place = 0
-        self._costs_s: deque[float] = deque(maxlen=WINDOW)
+        self._waits_s: deque[float] = deque(maxlen=WINDOW)
+        self._drawings_s: deque[float] = deque(maxlen=WINDOW)
 
     @property
     def level(self) -> Level:
         """The one to make pictures at."""
         return self._levels[self._place]
 
-    def note(self, cost_s: float, allowed_s: float) -> None:
+    def note(self, cost_s: float, drawing_s: float, allowed_s: float) -> None:
         """Learn what a picture of the present level cost.
 
         Args:
             cost_s: seconds from its request to its being sent.
+            drawing_s: those of them that depend on the level; the others wait for the frame set.
             allowed_s: seconds from one frame to the next, if nothing but frames changes the picture.
         """
-        self._costs_s.append(cost_s)
-        if len(self._costs_s) < WINDOW:
+        self._waits_s.append(max(0.0, cost_s - drawing_s))
+        self._drawings_s.append(drawing_s)
+        if len(self._waits_s) < WINDOW:
             return
-        average_s, budget_s = sum(self._costs_s) / WINDOW, max(BUDGET_S, allowed_s)
-        whole_s = average_s / self.level.cost
+        wait_s, budget_s = sum(self._waits_s) / WINDOW, max(BUDGET_S, allowed_s)
+        whole_s = sum(self._drawings_s) / WINDOW / self.level.cost
         for place, level in enumerate(self._levels):
-            if whole_s * level.cost <= (budget_s if place >= self._place else MARGIN * budget_s):
+            if wait_s + whole_s * level.cost <= (budget_s if place >= self._place else MARGIN * budget_s):
                 break
         self._place = place
-        self._costs_s.clear()
+        self._waits_s.clear()
+        self._drawings_s.clear()
 
 
 def shrink(decoded: DecodedSet, scale: float) -> DecodedSet:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -35,11 +35,13 @@ class MadePicture:
     Attributes:
         jpeg: the coded picture.
         facts: plain JSON values: what is shown, what it cost in ms, legend, damage, quality.
+        drawing_s: seconds of rendering and coding; what else it took was waiting for the frame set.
         damaged: it stands in for a frame that cannot be decoded.
     """
 
     jpeg: bytes
     facts: dict[str, Any]
+    drawing_s: float
     damaged: bool
 
 
@@ -75,11 +77,11 @@ class PictureMaker:
         self._ahead = ThreadPoolExecutor(1, "ahead")
         self._coming: tuple[int, Future[None]] | None = None
 
-    def make(self, request: PictureRequest, next_frame: int | None = None) -> MadePicture:
+    def make(self, request: PictureRequest, upcoming: Sequence[int] = ()) -> MadePicture:
         """Decode, render, compose and code one picture.
 
         Args:
-            next_frame: decoded and prepared meanwhile, since it will be asked for next.
+            upcoming: frames that are decoded meanwhile; the first, which is expected next, is prepared too.
 
         Raises:
             StreamError: no frame of the file can be decoded.
@@ -90,8 +92,8 @@ class PictureMaker:
         if stored.decoded is None:
             found = stored.damage.message if stored.damage else "no frame"
             raise StreamError(self.store.path.name, found, "a frame that can be decoded")
-        if next_frame is not None:
-            self._begin(replace(request, frame=next_frame))
+        if upcoming:
+            self._begin(replace(request, frame=upcoming[0]), upcoming[1:])
         start = time.perf_counter()
         decoded, look = self._drafts.of(stored.decoded, request.level.scale), LOOKS[request.look]
         viewpoints = look.place(decoded.array, request.viewpoint, request.eye_steps)
@@ -118,7 +120,7 @@ class PictureMaker:
             "damage": stored.damage and self._describe(stored.damage),
             "quality": self._measure(request, decoded, views),
         }
-        return MadePicture(jpeg, facts, stored.damage is not None)
+        return MadePicture(jpeg, facts, done - start, stored.damage is not None)
 
     def close(self) -> None:
         """Let go of the file; waits for pictures being made ahead."""
@@ -135,10 +137,12 @@ class PictureMaker:
     def _pool_of(self, level: Level) -> SynthesizerPool:
         return self._quick if level.quick else self._synthesizers
 
-    def _begin(self, request: PictureRequest) -> None:
+    def _begin(self, request: PictureRequest, later: Sequence[int]) -> None:
         # One at a time: with many viewers it is a help to none if it queues up.
         if self._coming is None or self._coming[1].done():
             self._coming = request.frame, self._ahead.submit(self._prepare, request)
+            for frame in later:
+                self._ahead.submit(self.store.fetch, frame)
 
     def _prepare(self, request: PictureRequest) -> None:
         """Decode a frame set and prepare it for views from about the viewpoint."""

@@ -214,13 +214,13 @@ class _Viewer:
             if made is None:
                 continue
             now_s = time.monotonic()
-            session.made(request, now_s - start_s, now_s)
+            session.made(request, now_s - start_s, made.drawing_s, now_s)
             await self._send_picture(made)
 
     async def _make(self, request: PictureRequest) -> MadePicture | None:
         """Have a picture made; None if it was overtaken, which one at a time may be."""
         maker, loop = self._broadcast.maker, asyncio.get_running_loop()
-        job = loop.run_in_executor(self._pool, maker.make, request, self._session.next_frame())
+        job = loop.run_in_executor(self._pool, maker.make, request, self._session.upcoming())
         while not job.done():
             news = asyncio.create_task(self._news.wait())
             await asyncio.wait((job, news), return_when=asyncio.FIRST_COMPLETED)

@@ -32,6 +32,9 @@ from mvcodec.player.messages import (
 
 MAX_IN_FLIGHT = 2
 
+LOOK_AHEAD = 3
+"""Frames that are decoded before they are asked for: the one after a dropped one is next at once."""
+
 MOVING_S = 0.2
 """How long after its last move a viewpoint counts as moving."""
 
@@ -143,11 +146,11 @@ class Session:
         self._last = request
         return request
 
-    def next_frame(self) -> int | None:
-        """The frame that playback will want after the last request; None while paused."""
+    def upcoming(self) -> tuple[int, ...]:
+        """The frames that playback will want next, in their order; none while paused."""
         if not self._clock.playing or self._last is None:
-            return None
-        return self._clock.following(self._last.frame)
+            return ()
+        return self._clock.following(self._last.frame, LOOK_AHEAD)
 
     def seconds_to_next(self, now_s: float) -> float | None:
         """How long until `next_request` may have news without a message; None: not before one."""
@@ -161,11 +164,11 @@ class Session:
         """Whether a picture being made is not worth waiting for: a whole one, and the viewpoint moves."""
         return request.level == WHOLE != self._pace.level and self._moving(now_s)
 
-    def made(self, request: PictureRequest, cost_s: float, now_s: float) -> None:
+    def made(self, request: PictureRequest, cost_s: float, drawing_s: float, now_s: float) -> None:
         """Note what a picture cost, which decides the level of the next ones."""
         moving = self._moving(now_s)
         if request.level == self._pace.level and (moving or self._clock.playing):
-            self._pace.note(cost_s, 0.0 if moving else 1 / (self._array.fps * self._clock.speed))
+            self._pace.note(cost_s, drawing_s, 0.0 if moving else 1 / (self._array.fps * self._clock.speed))
 
     def sent(self, now_s: float, *, damaged: bool = False) -> int:
         """Note that a picture leaves now; returns its number, from 1, which the page repeats in `Shown`."""
