@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from mvcodec.array import CameraArray
 from mvcodec.errors import MvCodecWarning, SettingError
 from mvcodec.frames import FloatMap, FrameSet, Mask, Picture
+from mvcodec.stereo.ambiguity import unambiguous
 from mvcodec.stereo.consistency import drop_speckles, left_right_check
 from mvcodec.stereo.pairwise import THREADS, CameraPair, camera_pairs, transposed
 from mvcodec.stereo.sgbm import Sgbm, SgbmSettings
@@ -41,6 +42,7 @@ _MAX_GAP_BINS = 2
 # support is asked of it, of the pixels of a pair: of values apart from all others, and of the
 # last of those in the main run.
 _NEAR_CLUSTER, _FAR_CLUSTER = 0.0007, 0.003
+_REPEATED_CLUSTER = 0.3
 _NEAR_TAIL, _FAR_TAIL = 0.0005, 0.001
 _NEAR_MARGIN, _FAR_MARGIN = 0.1, 0.02
 _LEAST_MARGIN_PX = 1.0
@@ -70,7 +72,8 @@ def estimate_range(
 
     Coarse to fine: small copies of the pairs are matched over a wide span, larger ones over
     what that found. Only pixels count that both directions agree on, in textured surroundings
-    that look alike in both pictures; values must be shared by a minimum of pixels of a pair.
+    that look alike in both pictures, and nowhere else as much; values must be shared by a minimum
+    of pixels of a pair.
 
     Args:
         array: the geometry.
@@ -202,7 +205,29 @@ def _sure_matches(left: Picture, right: Picture, span_px: tuple[float, float]) -
     partner = cv2.remap(grey_right, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     # Noise has contrast of its own, but no likeness in the other picture: both are asked for.
     sure &= _alike(grey, np.asarray(partner, np.float32))
-    return values, drop_speckles(values, sure, _MIN_PATCH_PX)
+    sure = drop_speckles(values, sure, _MIN_PATCH_PX)
+    return values, _not_repeated(values, sure, unambiguous(grey, grey_right, values, span_px))
+
+
+def _not_repeated(values: FloatMap, sure: Mask, unique: Mask) -> Mask:
+    """Sure matches less ambiguous ones, but of these the many that say the same stay.
+
+    On repeated texture the surroundings bring most of a wall to its place, and some of it a period
+    beside. Without any of it the wall would be lost.
+    """
+    doubtful = sure & ~unique
+    if not doubtful.any():
+        return sure
+    kept = drop_speckles(values, sure & unique, _MIN_PATCH_PX)
+    bins = np.floor(values).astype(np.int64)
+    first = bins[doubtful].min()
+    counts = np.bincount(bins[doubtful] - first)
+    runs = _runs(counts)
+    most = max(counts[start:end].sum() for start, end in runs)
+    for start, end in runs:
+        if counts[start:end].sum() >= _REPEATED_CLUSTER * most:
+            kept |= doubtful & (bins >= start + first) & (bins < end + first)
+    return kept
 
 
 def _alike(first: FloatMap, second: FloatMap) -> Mask:
