@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap, Mask
+from mvcodec.kernels.semiglobal import PARTS
 
 Costs = NDArray[np.uint8]
 Sums = NDArray[np.float32]
@@ -94,7 +95,7 @@ def path_costs(
                 continue
             last = path[v, u]
             difference = abs(float(grey[y, x]) - float(grey[v, u]))
-            jump = max(large / (1 + difference / contrast), least_large)
+            jump = np.floor(max(large / (1 + difference / contrast), least_large) * PARTS + 0.5) / PARTS
             for level in range(levels):
                 ways = [last[level], last.min() + jump]
                 ways += [last[beside] + small for beside in (level - 1, level + 1) if 0 <= beside < levels]
@@ -114,7 +115,7 @@ def aggregate(
     return total
 
 
-def winners(sums: Sums, low: int) -> FloatMap:
+def winners(sums: NDArray[np.uint16], low: int) -> FloatMap:
     levels = sums.shape[2]
     disparity = np.empty(sums.shape[:2], np.float32)
     for y, x in np.ndindex(*disparity.shape):

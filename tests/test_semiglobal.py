@@ -136,11 +136,10 @@ def test_aggregate_equals_equation_13(
     grey = rng.integers(0, 40, size).astype(np.float32)
     penalties = 35.0, 170.0, 50.0, 8.0
     # The first pass overwrites what it finds, the second adds to it.
-    before = np.full(costs.shape, np.nan if downwards else 1000, np.float32)
-    found = before.copy()
+    found = np.full(costs.shape, 1000, np.uint16)
     semiglobal.aggregate(costs, grey, *penalties, found, downwards)
-    expected = twins.aggregate(costs, grey, steps, penalties) + (0 if downwards else before)
-    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    expected = semiglobal.PARTS * twins.aggregate(costs, grey, steps, penalties) + (0 if downwards else 1000)
+    np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize("levels", [1, 2, 3])
@@ -151,17 +150,29 @@ def test_both_passes_walk_all_eight_paths(levels: int, penalties: tuple[float, f
     rng = np.random.default_rng(6)
     costs = rng.integers(0, 255, (5, 6, levels), np.uint8)
     grey = rng.uniform(0, 255, (5, 6)).astype(np.float32)
-    found = np.empty(costs.shape, np.float32)
+    found = np.empty(costs.shape, np.uint16)
     for downwards in (True, False):
         semiglobal.aggregate(costs, grey, *penalties, found, downwards)
-    expected = twins.aggregate(costs, grey, twins.FORTH + twins.BACK, penalties)
-    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    expected = semiglobal.PARTS * twins.aggregate(costs, grey, twins.FORTH + twins.BACK, penalties)
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_the_dearest_paths_fit_into_the_sums() -> None:
+    costs = np.full((9, 9, 8), semiglobal.MAX_COST, np.uint8)
+    costs[::2, :, 0] = costs[1::2, :, -1] = 0  # whichever way a path goes, it jumps or pays
+    most = float(semiglobal.MAX_PENALTY)
+    penalties = most, most, most, 1.0
+    sums = np.empty(costs.shape, np.uint16)
+    for downwards in (True, False):
+        semiglobal.aggregate(costs, np.zeros((9, 9), np.float32), *penalties, sums, downwards)
+    expected = twins.aggregate(costs, np.zeros((9, 9), np.float32), twins.FORTH + twins.BACK, penalties)
+    np.testing.assert_array_equal(sums, semiglobal.PARTS * expected)
 
 
 def test_what_one_pixel_knows_reaches_all_eight_ways() -> None:
     costs = np.full((7, 7, 3), 50, np.uint8)
     costs[3, 3, 1] = 0
-    sums = np.empty(costs.shape, np.float32)
+    sums = np.empty(costs.shape, np.uint16)
     for downwards in (True, False):
         semiglobal.aggregate(costs, np.zeros((7, 7), np.float32), 20, 40, 10, 8, sums, downwards)
     prefers = sums[..., 1] < sums[..., 0]
@@ -173,7 +184,7 @@ def test_what_one_pixel_knows_reaches_all_eight_ways() -> None:
 @pytest.mark.parametrize("levels", [1, 2, LEVELS])
 @pytest.mark.parametrize("spread", [3, 1000], ids=["many ties", "few ties"])
 def test_winners_equal_their_plain_twin(size: tuple[int, int], levels: int, spread: int) -> None:
-    sums = np.random.default_rng(7).integers(0, spread, (*size, levels)).astype(np.float32)
+    sums = np.random.default_rng(7).integers(0, spread, (*size, levels)).astype(np.uint16)
     found = np.full(size, np.nan, np.float32)
     semiglobal.winners(sums, -4, found)
     np.testing.assert_allclose(found, twins.winners(sums, -4), atol=1e-6)
@@ -194,13 +205,13 @@ def test_winners_equal_their_plain_twin(size: tuple[int, int], levels: int, spre
 )
 def test_winner_is_placed_between_levels(sums: list[float], expected: float) -> None:
     found = np.empty((1, 1), np.float32)
-    semiglobal.winners(np.array([[sums]], np.float32), 0, found)
+    semiglobal.winners(np.array([[sums]], np.uint16), 0, found)
     assert found[0, 0] == expected
 
 
 @pytest.mark.parametrize("centre", [1.6, 2.0, 2.3])
 def test_winner_of_a_v_is_exact(centre: float) -> None:
-    sums = np.abs(np.arange(5) - centre)[None, None].astype(np.float32)
+    sums = np.rint(1000 * np.abs(np.arange(5) - centre))[None, None].astype(np.uint16)
     found = np.empty((1, 1), np.float32)
     semiglobal.winners(sums, -10, found)
     assert found[0, 0] == pytest.approx(centre - 10, abs=1e-5)

@@ -29,6 +29,14 @@ from mvcodec.stereo.subpixel import refine
 
 THREADS = 2
 LEVELS_MULTIPLE = 8
+PENALTIES = (
+    "small_step",
+    "jump",
+    "least_jump",
+    "completion_small_step",
+    "completion_jump",
+    "completion_least_jump",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +49,7 @@ class JointSettings:
         lone_cost: added where one partner alone must see the pixel, 0..100.
         outside_cost: of a disparity that leaves every partner's picture, 0..254.
         small_step, jump, least_jump: penalties P1 and P2 of semi-global matching, and what is left of
-            P2 at an edge of the picture, at least 0.
+            P2 at an edge of the picture, 0..600; `completion_`: the same when the rest is completed.
         contrast: grey levels that halve P2, above 0.
         hold_per_px, hold_limit: how firmly confirmed pixels hold when the rest is completed.
         through_cost: of a disparity that another camera sees through, 0..254.
@@ -88,6 +96,7 @@ class JointSettings:
             "through_cost": (0, 254),
             "hold_limit": (0, 254),
             "contrast": (1e-3, 255),
+            **dict.fromkeys(PENALTIES, (0, 600)),
             "row_cost": (1, 1e6),
             "tolerance_px": (1e-3, 255),
             "subpixel_steps": (0, 20),
@@ -219,7 +228,7 @@ class Joint:
     ) -> FloatMap:
         from mvcodec.kernels import semiglobal
 
-        sums = np.empty(costs.shape, np.float32)
+        sums = np.empty(costs.shape, np.uint16)
         for downwards in (True, False):
             semiglobal.aggregate(
                 costs, view.grey, small, large, least, self.settings.contrast, sums, downwards
