@@ -59,6 +59,8 @@ class JointSettings:
         tolerance_px: maps agree within this, px, above 0.
         border_speckle_px: smallest patch that counts where no partner sees the whole range, pixels.
         median_size: window of the median after completion, 0 (none), 3 or 5.
+        thin_px, thin_area_px: the median leaves confirmed surfaces of at least this many pixels alone that
+            are nearer than all that it leaves around them, by more than this.
         subpixel_steps: steps of sub-pixel refinement, see `mvcodec.stereo.subpixel`.
 
     Raises:
@@ -85,6 +87,8 @@ class JointSettings:
     tolerance_px: float = 1.0
     border_speckle_px: int = 50
     median_size: int = 5
+    thin_px: float = 3
+    thin_area_px: int = 16
     subpixel_steps: int = 3
 
     def __post_init__(self) -> None:
@@ -175,7 +179,7 @@ class Joint:
             array.real,
         )
         maps = {
-            camera: median(np.clip(values, *range_px), self.settings.median_size, range_px)
+            camera: self._smoothed(np.clip(values, *range_px), valid[camera], range_px)
             for camera, values in zip(array.real, completed, strict=True)
         }
         for _ in range(self.settings.subpixel_steps):
@@ -296,6 +300,18 @@ class Joint:
         )
         holds = valid[camera] & (np.abs(completed - raw[camera]) <= 1.5)
         return np.where(holds, raw[camera], completed)
+
+    def _smoothed(self, disparity: FloatMap, valid: Mask, range_px: tuple[float, float]) -> FloatMap:
+        """The median, but poles and wires that it would take away stay where another camera confirms them.
+
+        At the contours of what is left the median has its way: there it is noise that stands out.
+        """
+        settings = self.settings
+        smooth = median(disparity, settings.median_size, range_px)
+        around = np.asarray(cv2.dilate(smooth, np.ones((3, 3), np.uint8)), np.float32)
+        thin = valid & (disparity - around > settings.thin_px)
+        thin &= drop_speckles(disparity, valid, settings.thin_area_px)
+        return np.where(thin, disparity, smooth)
 
     def _beyond_partners(
         self, array: CameraArray, camera: Position, view: _View, valid: Mask, disparity: FloatMap
