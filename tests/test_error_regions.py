@@ -9,7 +9,7 @@ import pytest
 from small_arrays import photograph
 
 from mvcodec.array import Viewpoint
-from mvcodec.evaluation.error_regions import REGIONS, ErrorMeter, flat, region_numbers
+from mvcodec.evaluation.error_regions import REGIONS, ErrorMeter, flat, noise_variance, region_numbers
 from mvcodec.frames import Picture, RenderedView
 
 FILLED, EDGES, FLAT, TEXTURE = range(len(REGIONS))
@@ -84,7 +84,29 @@ def test_without_error_no_share_of_it_is_named() -> None:
     meter = ErrorMeter()
     meter.push(original(), rendered(original()))
     document = meter.result().to_json()
-    assert document["worst_share"] is document["brightness_share"] is None
+    assert document["worst_share"] is document["brightness_share"] is document["noise_share"] is None
     assert list(document["regions"]) == list(REGIONS)
     assert {region["error_share"] for region in document["regions"].values()} == {None}
     assert sum(region["share"] for region in document["regions"].values()) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("deviation", [1.0, 3.0, 8.0])
+def test_noise_is_found_beneath_ramps_and_edges(deviation: float) -> None:
+    across = np.linspace(40, 200, 300)[None] + np.where(np.arange(200) % 50 < 25, 0, 20)[:, None]
+    noisy = across + np.random.default_rng(1).normal(0, deviation, across.shape)
+    assert noise_variance(np.rint(noisy).astype(np.uint8)) == pytest.approx(deviation**2, rel=0.15)
+
+
+def test_a_clean_picture_has_no_noise_and_a_tiny_one_none_that_shows() -> None:
+    assert noise_variance(np.repeat(np.arange(60, dtype=np.uint8)[None], 40, axis=0)) == 0
+    assert noise_variance(np.zeros((2, 1), np.uint8)) == 0
+
+
+def test_a_perfect_view_of_a_noisy_original_is_all_noise() -> None:
+    rng, clean = np.random.default_rng(2), np.full((80, 120, 3), 120, np.uint8)
+    noisy = np.repeat(np.rint(clean[..., :1] + rng.normal(0, 4, (80, 120, 1))), 3, axis=2).astype(np.uint8)
+    shape = clean.shape[:2]
+    view = RenderedView(Viewpoint(0, 0), clean, np.zeros(shape, np.float32), np.ones(shape, np.uint8))
+    meter = ErrorMeter()
+    meter.push(noisy, view)
+    assert meter.result().noise_share == pytest.approx(1, abs=0.1)

@@ -94,7 +94,7 @@ def test_error_shares_add_up(array: Path) -> None:
     done = run("error_shares.py", "--data", array.parent, "--json")
     assert done.returncode == 0, done.stderr
     shares = json.loads(done.stdout)["sets"]["small"]
-    assert list(shares) == ["regions", "worst_share", "brightness_share"]
+    assert list(shares) == ["regions", "worst_share", "brightness_share", "noise_share"]
     assert list(shares["regions"]) == ["filled", "edges", "flat", "texture"]
     for name in ("share", "error_share"):
         assert sum(region[name] for region in shares["regions"].values()) == pytest.approx(1)

@@ -11,8 +11,8 @@ A pixel belongs to the first of these regions that fits:
     texture  every other pixel
 
 For each: its share of the pixels, its share of the total squared luma error, and the PSNR inside it. Then the
-share of the error that lies in the worst 2 % of each view's pixels, and the share that would vanish if each
-view had the mean brightness of its original.
+share of the error that lies in the worst 2 % of each view's pixels, the share that would vanish if each
+view had the mean brightness of its original, and the share, at most, that the originals' own noise makes.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ def line(name: str, shares: ErrorShares) -> str:
         decibel = f"{region.psnr_y:.1f}" if region.psnr_y is not None else "-"
         cells.append(f"{region.share:6.1%} {_percent(region.error_share)} {decibel:>5}")
     worst, brightness = _percent(shares.worst_share), _percent(shares.brightness_share)
-    return f"{name:12} | " + " | ".join(cells) + f" | {worst} {brightness:>10}"
+    rest = f"{worst} {brightness:>10} {_percent(shares.noise_share)}"
+    return f"{name:12} | " + " | ".join(cells) + f" | {rest}"
 
 
 def _percent(share: float | None) -> str:
@@ -59,7 +60,7 @@ def measure(arguments: argparse.Namespace) -> dict[str, Any]:
     sets = with_virtual_views(find_sets(arguments.data, arguments.sets), arguments)
     say(f"{'':12} | " + " | ".join(f"{name:19}" for name in REGIONS) + " |", arguments)
     columns = [f"{'pixels':>6} {'error':>6} {'dB':>5}"] * len(REGIONS)
-    say(f"{'set':12} | " + " | ".join(columns) + " | worst 2% brightness", arguments)
+    say(f"{'set':12} | " + " | ".join(columns) + " | worst 2% brightness  noise", arguments)
     for name, source in sets.items():
         shares = measure_errors(source, arguments.matcher, synthesizer)
         document[name] = shares.to_json()

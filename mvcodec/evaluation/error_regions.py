@@ -24,6 +24,13 @@ and Szeliski (IJCV 47, 2002), with the larger of both directions in place of the
 
 WORST_SHARE = 0.02
 
+NOISE_KERNEL = np.outer([1, -2, 1], [1, -2, 1]).astype(np.float32)
+"""Blind to constant, linear and one-directional changes (Immerkaer, CVIU 64, 1996)."""
+NOISE_GAIN = 6.0
+"""The root of the kernel's sum of squares."""
+LOWER_HALF_MEAN = 0.3247
+"""Mean of the smaller half of a normal variable's magnitudes, in standard deviations."""
+
 
 @dataclass(frozen=True, slots=True)
 class RegionError:
@@ -48,11 +55,14 @@ class ErrorShares:
         regions: by name, in the order of REGIONS.
         worst_share: of the error, in the 2 % of each view's pixels that have the largest one.
         brightness_share: of the error, what would vanish if every view had its original's mean luma.
+        noise_share: of the error, what the originals' own noise would make of a perfect view: at most, since
+            fine texture passes for noise (`noise_variance`).
     """
 
     regions: Mapping[str, RegionError]
     worst_share: float | None
     brightness_share: float | None
+    noise_share: float | None
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values by name."""
@@ -61,6 +71,7 @@ class ErrorShares:
             "regions": regions,
             "worst_share": self.worst_share,
             "brightness_share": self.brightness_share,
+            "noise_share": self.noise_share,
         }
 
 
@@ -70,7 +81,7 @@ class ErrorMeter:
     def __init__(self) -> None:
         self._pixels = np.zeros(len(REGIONS), np.int64)
         self._errors = np.zeros(len(REGIONS), np.int64)
-        self._worst, self._brightness = 0, 0.0
+        self._worst, self._brightness, self._noise = 0, 0.0, 0.0
 
     def push(self, original: Picture, view: RenderedView) -> None:
         """Measure one view.
@@ -87,6 +98,7 @@ class ErrorMeter:
         worst = max(1, round(WORST_SHARE * squares.size))
         self._worst += int(np.partition(squares, -worst, axis=None)[-worst:].sum())
         self._brightness += float(difference.mean()) ** 2 * difference.size
+        self._noise += noise_variance(luma(original)) * difference.size
 
     def result(self) -> ErrorShares:
         """The shares over what was pushed so far, one view at least."""
@@ -100,8 +112,9 @@ class ErrorMeter:
             for name, count, error in zip(REGIONS, self._pixels, self._errors, strict=True)
         }
         if not errors:
-            return ErrorShares(regions, None, None)
-        return ErrorShares(regions, self._worst / errors, self._brightness / errors)
+            return ErrorShares(regions, None, None, None)
+        noise = min(1.0, self._noise / errors)
+        return ErrorShares(regions, self._worst / errors, self._brightness / errors, noise)
 
 
 def region_numbers(original: Picture, view: RenderedView) -> NDArray[np.uint8]:
@@ -126,3 +139,15 @@ def flat(plane: Luma) -> Mask:
     window = (FLAT_WINDOW, FLAT_WINDOW)
     means = [cv2.blur(squares, window, borderType=cv2.BORDER_REPLICATE) for squares in (across, down)]
     return np.asarray(np.maximum(*means) < FLAT_SQUARED_GRADIENT)
+
+
+def noise_variance(plane: Luma) -> float:
+    """Variance of a picture's noise, squared grey levels, from the half of its pixels that change least.
+
+    0 where the picture has no pixel with a neighbour on every side.
+    """
+    found = np.abs(cv2.filter2D(plane.astype(np.float32), -1, NOISE_KERNEL)[1:-1, 1:-1])
+    if found.size == 0:
+        return 0.0
+    lower = np.partition(found, found.size // 2, axis=None)[: found.size // 2 + 1]
+    return float((lower.mean() / (NOISE_GAIN * LOWER_HALF_MEAN)) ** 2)
