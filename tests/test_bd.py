@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from mvcodec.evaluation.bd import RatePoint, compare_curves, curve_warnings, front, overtaking
+from mvcodec.evaluation.bd import RatePoint, anchor_lead, compare_curves, curve_warnings, front
 
 RATES = (100.0, 200.0, 400.0, 800.0)
 
@@ -65,24 +65,76 @@ def test_the_order_of_points_does_not_matter() -> None:
 
 def test_an_anchor_that_is_steeper_overtakes_where_the_curves_cross() -> None:
     anchor = [(rate, 30 + 6 * math.log2(rate / 200)) for rate in RATES]
-    found = overtaking(anchor, line())
-    assert found is not None
-    assert found.kbps == pytest.approx(400, rel=0.01)
-    assert found.psnr_y == pytest.approx(36, abs=0.1)
-    assert not found.at_most
+    lead = anchor_lead(anchor, line())
+    assert lead.overtaking is not None
+    assert lead.overtaking.kbps == pytest.approx(400, rel=0.01)
+    assert lead.overtaking.psnr_y == pytest.approx(36, abs=0.1)
+    assert not lead.overtaking.at_most
+    (ahead,) = lead.ranges_kbps
+    assert ahead == pytest.approx((lead.overtaking.kbps, 800))
 
 
 def test_a_curve_that_ends_is_overtaken_at_its_best_quality() -> None:
     ended = [(rate, decibel + 2) for rate, decibel in line()[:2]]
-    found = overtaking(line(), ended)
+    found = anchor_lead(line(), ended).overtaking
     assert found is not None
     assert found.psnr_y == pytest.approx(35, abs=0.05)
     assert found.kbps == pytest.approx(100 * 2 ** (5 / 3), rel=0.01)
 
 
 def test_an_anchor_that_is_always_better_overtakes_at_most_there() -> None:
-    found = overtaking(line(at_100=31), line())
-    assert found is not None
-    assert found.at_most
-    assert found.kbps == 100
-    assert overtaking(line(at_100=29), line()) is None
+    lead = anchor_lead(line(at_100=31), line())
+    assert lead.overtaking is not None
+    assert lead.overtaking.at_most
+    assert lead.overtaking.kbps == 100
+    (ahead,) = lead.ranges_kbps
+    assert ahead == pytest.approx((100, 800))
+    never = anchor_lead(line(at_100=29), line())
+    assert (never.ranges_kbps, never.overtaking) == ((), None)
+
+
+def test_an_anchor_of_far_fewer_bits_is_ahead_everywhere_and_has_no_bd_psnr() -> None:
+    anchor = line((100, 200, 400, 800), slope_db=2, at_100=29)
+    tested = line((1000, 2000, 4000, 8000), slope_db=2, at_100=28 - 2 * math.log2(10))
+    lead = anchor_lead(anchor, tested)
+    assert lead.overtaking is not None
+    assert lead.overtaking.at_most
+    assert lead.overtaking.kbps == 1000
+    assert lead.overtaking.psnr_y == pytest.approx(35)
+    (ahead,) = lead.ranges_kbps
+    assert ahead == pytest.approx((1000, 8000))
+    delta = compare_curves(anchor, tested)
+    assert delta.psnr_db is None
+    assert delta.rate_percent is not None
+    assert delta.rate_percent > 900
+    assert "no rate in common: no BD-PSNR" in delta.warnings
+
+
+def test_an_anchor_of_far_fewer_bits_that_ends_at_less_quality_is_passed() -> None:
+    tested = line((1000, 2000, 4000, 8000), at_100=28 - 3 * math.log2(10))
+    lead = anchor_lead(line((100, 200), at_100=28), tested)
+    assert lead.overtaking is None
+    (ahead,) = lead.ranges_kbps
+    assert ahead == pytest.approx((1000, 2000), rel=0.01)
+    worse = anchor_lead(line((100, 200), at_100=20), tested)
+    assert (worse.ranges_kbps, worse.overtaking) == ((), None)
+
+
+def test_an_anchor_that_leads_at_low_rates_alone_does_not_overtake() -> None:
+    flat = line(slope_db=2, at_100=31)
+    lead = anchor_lead(flat, line())
+    assert lead.overtaking is None
+    (ahead,) = lead.ranges_kbps
+    assert ahead == pytest.approx((100, 200), rel=0.01)
+
+
+def test_curves_that_cross_more_than_once_are_overtaken_at_the_last_crossing() -> None:
+    wave = [(rate, decibel + shift) for (rate, decibel), shift in zip(line(), (1, -1, -1, 1), strict=True)]
+    lead = anchor_lead(wave, line())
+    assert lead.overtaking is not None
+    assert 400 < lead.overtaking.kbps < 800
+    assert not lead.overtaking.at_most
+    first, last = lead.ranges_kbps
+    assert first[0] == 100
+    assert 100 < first[1] < 200
+    assert last == pytest.approx((lead.overtaking.kbps, 800))

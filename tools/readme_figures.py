@@ -67,34 +67,43 @@ def quality_table(benchmark: Mapping[str, Any]) -> str:
 
 
 def rate_table(reports: Sequence[Mapping[str, Any]]) -> str:
-    """BD-rate against the anchors of the same codec, one line an input; who overtakes first."""
+    """BD-rate against each anchor, with the dB that it holds for, one line an input; who overtakes first."""
     if not reports:
         return ""
     anchors = list(dict.fromkeys(anchor for report in reports for anchor in report["bd_rate"]))
     lines = [
-        f"| input | codec | {' | '.join(anchors)} | overlap, dB | first overtaken |",
-        "|---" * (len(anchors) + 4) + "|",
+        f"| input | codec | {' | '.join(anchors)} | first overtaken |",
+        "|---" * (len(anchors) + 3) + "|",
     ]
     for report in reports:
-        rates, codec = report["bd_rate"], report["curves"][0]["codec"]
-        known = {anchor: rates[anchor] for anchor in anchors if rates.get(anchor, {}).get("all") is not None}
-        cells = [f"{known[anchor]['all']:+.1f} %" if anchor in known else "" for anchor in anchors]
-        low = min(figures["overlap_db"][0] for figures in known.values())
-        high = max(figures["overlap_db"][1] for figures in known.values())
-        line = [Path(report["input"]).name, codec, *cells, f"{low:.1f} - {high:.1f}", _overtaken(known)]
-        lines.append(f"| {' | '.join(line)} |")
+        deltas, codec = report["bd_rate"], report["curves"][0]["codec"]
+        cells = [_percent(deltas[anchor]) if anchor in deltas else "" for anchor in anchors]
+        lines.append(f"| {' | '.join([Path(report['input']).name, codec, *cells, _overtaken(deltas)])} |")
     return "\n".join(lines)
 
 
-def _overtaken(known: Mapping[str, Mapping[str, Any]]) -> str:
-    """The anchor that is ahead of mvcodec from the lowest bit rate on, and that rate."""
-    places = {anchor: figures["overtaken"] for anchor, figures in known.items() if figures["overtaken"]}
-    if not places:
-        return ""
-    anchor = min(places, key=lambda name: places[name]["kbps"])
-    where = places[anchor]
-    sign = "<= " if where["at_most"] else ""
-    return f"{anchor}: {sign}{where['kbps'] / 1000:.2f} Mbit/s, {where['psnr_y']:.1f} dB"
+def _percent(delta: Mapping[str, Any]) -> str:
+    if delta["all"] is None:
+        return "no common quality"
+    low, high = delta["overlap_db"]
+    return f"{delta['all']:+.1f} % ({low:.1f} - {high:.1f})"
+
+
+def _overtaken(deltas: Mapping[str, Mapping[str, Any]]) -> str:
+    """The anchor that stays ahead from the lowest rate on, and who is ahead before it is passed."""
+    parts = []
+    places = {anchor: delta["overtaken"] for anchor, delta in deltas.items() if delta["overtaken"]}
+    if places:
+        anchor = min(places, key=lambda name: places[name]["kbps"])
+        where = places[anchor]
+        sign = "everywhere, <= " if where["at_most"] else ""
+        parts.append(f"{anchor}: {sign}{where['kbps'] / 1000:.2f} Mbit/s, {where['psnr_y']:.1f} dB")
+    for anchor, delta in deltas.items():
+        # Reports that are older than this entry tell of the last range alone.
+        ranges = delta.get("anchor_ahead_kbps", [])
+        for low, high in ranges[:-1] if anchor in places else ranges:
+            parts.append(f"{anchor}: {low / 1000:.2f} - {high / 1000:.2f} Mbit/s")
+    return "; ".join(parts)
 
 
 def _read(path: Path) -> Any:

@@ -44,16 +44,30 @@ class CurveDelta:
 
 @dataclass(frozen=True, slots=True)
 class Overtaking:
-    """Where an anchor begins to be better.
+    """The rate from which on an anchor stays better, to the end of the rates that were compared.
 
     Attributes:
-        kbps, psnr_y: the crossing.
-        at_most: the anchor is better wherever both were measured; it overtakes here or below.
+        kbps, psnr_y: the last crossing, or where the comparison begins.
+        at_most: the anchor is better at every compared rate: it overtakes here or below.
     """
 
     kbps: float
     psnr_y: float
     at_most: bool
+
+
+@dataclass(frozen=True, slots=True)
+class AnchorLead:
+    """Where an anchor is better than the tested curve.
+
+    Attributes:
+        ranges_kbps: every (from, to) of rates in which it is, ascending.
+        overtaking: the beginning of the last of them, if that one goes on to the end of the compared
+            rates; else None.
+    """
+
+    ranges_kbps: tuple[tuple[float, float], ...]
+    overtaking: Overtaking | None
 
 
 def compare_curves(anchor: Sequence[RatePoint], tested: Sequence[RatePoint]) -> CurveDelta:
@@ -82,6 +96,8 @@ def compare_curves(anchor: Sequence[RatePoint], tested: Sequence[RatePoint]) -> 
     options = {"method": METHOD, "require_matching_points": False, "min_overlap": 0}
     percent = None if overlap is None else float(bd_rate(rate_a, db_a, rate_t, db_t, **options))
     common_rate = _common(np.log10(rate_a), np.log10(rate_t))
+    if common_rate is None:
+        warnings.append("no rate in common: no BD-PSNR")
     decibel = None if common_rate is None else float(bd_psnr(rate_a, db_a, rate_t, db_t, **options))
     return CurveDelta(percent, decibel, overlap, tuple(warnings))
 
@@ -97,21 +113,28 @@ def curve_warnings(curve: Sequence[RatePoint]) -> list[str]:
     return warnings
 
 
-def overtaking(anchor: Sequence[RatePoint], tested: Sequence[RatePoint]) -> Overtaking | None:
-    """The lowest rate from which an anchor is better than the tested curve; None if it never is.
+def anchor_lead(anchor: Sequence[RatePoint], tested: Sequence[RatePoint]) -> AnchorLead:
+    """Where an anchor is better than the tested curve.
 
-    Above its highest rate the tested curve counts as flat: its last point fits into more bits, too.
+    They are compared from the lowest rate that both have to the anchor's highest. Above its highest rate
+    a curve counts as flat: its last point fits into more bits, too. So an anchor that ends below the
+    tested curve's lowest rate is compared over the whole of that curve.
     """
     ours, theirs = front(tested), front(anchor)
-    if not ours or not theirs or theirs[-1][0] < ours[0][0]:
-        return None
-    low, high = max(ours[0][0], theirs[0][0]), theirs[-1][0]
+    if not ours or not theirs:
+        return AnchorLead((), None)
+    low = max(ours[0][0], theirs[0][0])
+    high = (theirs if theirs[-1][0] >= ours[0][0] else ours)[-1][0]
     rates = np.geomspace(low, high, _STEPS) if high > low else np.array([low])
-    ahead = _quality(theirs, rates) > _quality(ours, rates)
-    if not ahead.any():
-        return None
-    first = int(ahead.argmax())
-    return Overtaking(float(rates[first]), float(_quality(theirs, rates[first : first + 1])[0]), first == 0)
+    quality = _quality(theirs, rates)
+    ahead = quality > _quality(ours, rates)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], ahead, [False]))))
+    starts, ends = edges[::2], edges[1::2]
+    ranges = tuple((float(rates[s]), float(rates[e - 1])) for s, e in zip(starts, ends, strict=True))
+    if not ahead[-1]:
+        return AnchorLead(ranges, None)
+    start = int(starts[-1])
+    return AnchorLead(ranges, Overtaking(float(rates[start]), float(quality[start]), start == 0))
 
 
 def front(curve: Sequence[RatePoint]) -> list[RatePoint]:

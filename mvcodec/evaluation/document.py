@@ -11,11 +11,10 @@ from typing import Any
 import mvcodec
 from mvcodec.evaluation.bd import (
     CurveDelta,
-    Overtaking,
     RatePoint,
+    anchor_lead,
     compare_curves,
     curve_warnings,
-    overtaking,
 )
 from mvcodec.evaluation.points import CurvePoint
 from mvcodec.evaluation.study import Curve, StudyRun
@@ -89,7 +88,7 @@ def _delta(anchor: Sequence[CurvePoint], ours: Sequence[CurvePoint]) -> dict[str
         kind: compare_curves(*pair) if pair[1] else CurveDelta(None, None, None, ())
         for kind, pair in by_kind.items()
     }
-    overtaken = overtaking(*by_kind["all"])
+    lead = anchor_lead(*by_kind["all"])
     overlap, virtual = found["all"].overlap_db, found["virtual"].overlap_db
     return {
         "all": found["all"].rate_percent,
@@ -97,13 +96,10 @@ def _delta(anchor: Sequence[CurvePoint], ours: Sequence[CurvePoint]) -> dict[str
         "overlap_db": None if overlap is None else list(overlap),
         "virtual_overlap_db": None if virtual is None else list(virtual),
         "bd_psnr_db": {kind: found[kind].psnr_db for kind in KINDS},
-        "overtaken": _overtaken(overtaken),
+        "overtaken": None if lead.overtaking is None else asdict(lead.overtaking),
+        "anchor_ahead_kbps": [list(rates) for rates in lead.ranges_kbps],
         "warnings": [f"{kind} views: {text}" for kind in KINDS for text in found[kind].warnings],
     }
-
-
-def _overtaken(found: Overtaking | None) -> dict[str, Any] | None:
-    return None if found is None else asdict(found)
 
 
 def _rate_points(points: Sequence[CurvePoint], kind: str) -> list[RatePoint]:

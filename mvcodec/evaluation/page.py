@@ -107,23 +107,27 @@ def _deltas(document: Mapping[str, Any]) -> str:
             _number(delta["virtual"], "+.1f", " %"),
             _number(delta["bd_psnr_db"]["all"], "+.2f", " dB"),
             "none" if overlap is None else f"{overlap[0]:.2f} to {overlap[1]:.2f} dB",
-            _overtaken(delta["overtaken"]),
+            _overtaken(delta),
         ]
         rows.append(("", cells))
     text = (
         "BD-rate: the bits that mvcodec needs, compared with the anchor's, for equal quality (negative:"
         " fewer); BD-PSNR: its gain in luma PSNR at equal rate. Piecewise cubics (PCHIP) over the"
-        " logarithm of the rate, over the range that both curves reach. Above the stated rate the anchor"
-        " is better."
+        " logarithm of the rate, over the range that both curves reach. From the stated rate on the"
+        " anchor is better, up to its highest; above its own highest rate a curve counts as flat."
     )
     return f'<p class="soft">{escape(text)}</p>' + _table(head, rows)
 
 
-def _overtaken(found: Mapping[str, Any] | None) -> str:
+def _overtaken(delta: Mapping[str, Any]) -> str:
+    found, ranges = delta["overtaken"], delta["anchor_ahead_kbps"]
+    earlier = [f"{low:.0f} to {high:.0f}" for low, high in (ranges if found is None else ranges[:-1])]
     if found is None:
-        return "not in this range"
-    at_most = "at or below " if found["at_most"] else ""
-    return f"{at_most}{found['kbps']:.0f} kbit/s, {found['psnr_y']:.2f} dB"
+        return f"not at the end; ahead at {', '.join(earlier)} kbit/s" if earlier else "not in this range"
+    place = f"{found['kbps']:.0f} kbit/s, {found['psnr_y']:.2f} dB"
+    if found["at_most"]:
+        return f"ahead everywhere, from {place} or below"
+    return place + (f"; ahead at {', '.join(earlier)} kbit/s, too" if earlier else "")
 
 
 def _warnings(document: Mapping[str, Any]) -> str:
