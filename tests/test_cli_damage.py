@@ -18,6 +18,8 @@ from damage import COUNT, GOP, chunk_ends, outcome, small_file
 from mvcodec.container import McapReader
 from mvcodec.decoder import Decoder
 
+QUICK = ("--synthesizer", "linear")
+
 
 @pytest.fixture(scope="module")
 def file() -> bytes:
@@ -67,6 +69,30 @@ def test_a_file_cut_before_its_first_whole_frame_set_has_nothing_to_decode(
             assert "found a file cut off before its first frame set ended" in line
         assert not out.exists()
         assert not (tmp_path / "clean.mcap").exists()
+
+
+@pytest.mark.parametrize(("form", "name"), [("array", "out"), ("mcap", "out.mcap"), ("mosaic", "out.mp4")])
+def test_json_says_how_much_of_a_file_was_read(file: bytes, tmp_path: Path, form: str, name: str) -> None:
+    whole = tmp_path / "whole.mcap"
+    whole.write_bytes(file)
+    arguments = ("decode", whole, tmp_path / name, "--format", form, *QUICK, "--json")
+    report = json.loads(succeeds(*arguments))
+    assert (report["frames"], report["bytes"]) == (COUNT, len(file))
+    assert len(file) / 2 < report["bytes_read"] <= 2 * len(file)
+    part = json.loads(succeeds(*arguments, "--frames", ":2"))
+    assert part["frames"] == 2
+    assert part["bytes_read"] < report["bytes_read"]
+
+
+def test_json_comes_before_the_line_about_damage(flipped: Path, cut: Path, tmp_path: Path) -> None:
+    done = mvcodec("decode", flipped, tmp_path / "out", *QUICK, "--json")
+    assert done.returncode == 1
+    assert "at 1.000..1.400 s: found damage" in done.stderr
+    assert json.loads(done.stdout)["frames"] == 2 * GOP
+    done = mvcodec("decode", cut, tmp_path / "out", *QUICK, "--json")
+    assert done.returncode == 0
+    assert "cut off after" in done.stderr
+    assert json.loads(done.stdout)["bytes"] == cut.stat().st_size
 
 
 def test_damage_is_skipped_where_that_is_asked_for(flipped: Path, tmp_path: Path) -> None:

@@ -120,8 +120,10 @@ def run(arguments: argparse.Namespace) -> None:
                     break  # one picture holds one frame set
         except StreamError as error:
             damage = error  # the outputs are completed first, so that what was decoded stays
+        # A closed file has no size.
+        report = {"frames": frames, "bytes_read": decoder.bytes_read, "bytes": decoder.bytes}
     if arguments.json:
-        print(json.dumps({"frames": frames, "bytes_read": decoder.bytes_read, "bytes": decoder.bytes}))
+        print(json.dumps(report))
     if damage is not None:
         raise damage
 
