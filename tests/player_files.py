@@ -21,6 +21,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from mvcodec.capture import open_input
 from mvcodec.capture.scene import SceneSettings
+from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER
 from mvcodec.container import McapWriter
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.frames import Picture
@@ -28,8 +29,8 @@ from mvcodec.output.sample import write_sample
 
 FRAMES, GOP = 12, 4
 SIZE = (240, 160)
-SYNTHESIZER = "linear"
-"""Quick to compile, and there whatever the default is."""
+SYNTHESIZER = DEFAULT_SYNTHESIZER
+"""What viewers see unless they ask for another; tests that need none of its quality take a quicker one."""
 
 
 def write_original(folder: Path, grid: tuple[int, int] = (3, 3), frames: int = FRAMES) -> Path:
@@ -88,8 +89,6 @@ class Running:
 def playing(*arguments: str | Path, port: int = 0) -> Iterator[Running]:
     """Run ``mvcodec play`` until the end of the block."""
     command = [*COMMAND, "play", *map(str, arguments), "--no-browser", "--port", str(port)]
-    if "--synthesizer" not in arguments:
-        command += ["--synthesizer", SYNTHESIZER]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=sys.stderr, text=True)
     try:
         assert process.stdout is not None

@@ -20,7 +20,7 @@ from browser_page import (
     show,
     shows,
 )
-from player_files import FRAMES, GOP, Running, damage, playing
+from player_files import FRAMES, GOP, Running, damage, encode, playing, write_original
 from playwright.sync_api import Browser, Page
 
 from mvcodec.evaluation.metrics import psnr
@@ -99,6 +99,38 @@ def test_fits_a_phone(page: Page, server: Running, width: int, height: int) -> N
     page.click("#open-help")
     assert page.evaluate("document.getElementById('help').scrollTop") == 0
     assert box_of(page, "#help button")["y"] + box_of(page, "#help button")["height"] <= height
+
+
+@pytest.mark.parametrize("grid", [(3, 1), (1, 4)])
+def test_the_map_of_one_line_of_cameras_stays_small(
+    page: Page, tmp_path: Path, grid: tuple[int, int]
+) -> None:
+    file = encode(write_original(tmp_path / "original", grid, frames=1), tmp_path / "line.mcap")
+    with playing(file) as running:
+        show(page, running)
+        box = box_of(page, "#map")
+        assert 20 < min(box["width"], box["height"]) < max(box["width"], box["height"]) < 130
+        rows, cols = grid
+        page.mouse.click(box["x"] + box["width"] - 2, box["y"] + box["height"] - 2)
+        shows(page, row=rows - 1, col=cols - 1)
+        screenshot(page, f"map-{rows}x{cols}")
+
+
+def test_a_picture_that_cannot_be_drawn_is_told_and_the_next_one_is_drawn(
+    page: Page, server: Running
+) -> None:
+    show(page, server)
+    page.evaluate("""() => {
+        const whole = window.createImageBitmap;
+        window.createImageBitmap = () => {
+            window.createImageBitmap = whole;
+            return Promise.reject(new Error("a broken picture"));
+        };
+    }""")
+    page.keyboard.press(".")
+    page.wait_for_selector("#notice:has-text('a broken picture')")
+    page.keyboard.press(".")
+    shows(page, frame=2)
 
 
 def test_controls_are_labelled_and_show_the_focus(page: Page, server: Running) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from command_line import fails
-from player_files import FRAMES, GOP, Running, Viewer, damage, playing, write_original
+from player_files import FRAMES, GOP, SYNTHESIZER, Running, Viewer, damage, playing, write_original
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from mvcodec.array import Viewpoint
@@ -22,7 +22,7 @@ from mvcodec.errors import MissingExtra
 from mvcodec.evaluation.metrics import psnr, ssim
 from mvcodec.player.access import AccessRules, is_loopback
 from mvcodec.player.messages import MAX_MESSAGE_BYTES
-from mvcodec.synthesis.linear import Linear
+from mvcodec.synthesis.table import make_synthesizer
 
 pytest_plugins = ("player_fixtures",)
 
@@ -102,7 +102,7 @@ def test_sends_the_picture_that_the_library_renders(
 ) -> None:
     with Decoder.open(file, slice(frame, frame + 1)) as decoder:
         (decoded,) = decoder
-    expected = Linear().render(decoded, Viewpoint(row, col)).pixels
+    expected = make_synthesizer(SYNTHESIZER).render(decoded, Viewpoint(row, col)).pixels
     with Viewer(server) as viewer:
         viewer.say("move", row=row, col=col)
         viewer.say("seek", frame=frame)
@@ -116,7 +116,7 @@ def test_sends_the_picture_that_the_library_renders(
 def test_measures_against_the_original(server: Running, file: Path, original: Path) -> None:
     with Decoder.open(file, slice(5, 6)) as decoder:
         (decoded,) = decoder
-    rendered = Linear().render(decoded, Viewpoint(1, 0)).pixels
+    rendered = make_synthesizer(SYNTHESIZER).render(decoded, Viewpoint(1, 0)).pixels
     (frames,) = open_input([original]).frame_sets(slice(5, 6), [(1, 0)])
     with Viewer(server) as viewer:
         for kind, fields in (("seek", {"frame": 5}), ("move", {"row": 1, "col": 0})):
@@ -206,7 +206,12 @@ def test_damage_is_told_and_playback_goes_on_or_stops(file: Path, tmp_path: Path
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_twenty_viewers_are_served_without_growth_of_memory(server: Running) -> None:
+def test_twenty_viewers_are_served_without_growth_of_memory(file: Path) -> None:
+    with playing(file, "--synthesizer", "linear") as server:
+        check_memory(server)
+
+
+def check_memory(server: Running) -> None:
     rng = random.Random(3)
 
     def watch() -> None:

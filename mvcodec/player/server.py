@@ -223,8 +223,10 @@ class _Viewer:
         job = loop.run_in_executor(self._pool, maker.make, request, self._session.upcoming())
         while not job.done():
             news = asyncio.create_task(self._news.wait())
-            await asyncio.wait((job, news), return_when=asyncio.FIRST_COMPLETED)
-            news.cancel()
+            try:
+                await asyncio.wait((job, news), return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                news.cancel()
             self._news.clear()
             free = self._overtaken is None or self._overtaken.done()
             if free and not job.done() and self._session.overtaken(request, time.monotonic()):

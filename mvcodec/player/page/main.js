@@ -100,6 +100,11 @@ class Player {
         this.send("shown", { picture: facts.picture });
         this.stats.note(facts);
         this.showFacts();
+      })
+      .catch((error) => {
+        // The next one is drawn all the same, and the server waits for no answer about this one.
+        this.send("shown", { picture: facts.picture });
+        this.warn(`Frame ${facts.frame} cannot be drawn: ${error.message}`);
       });
   }
 

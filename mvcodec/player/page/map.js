@@ -23,6 +23,8 @@ export class ArrayMap {
     const width = cols - 1 + 2 * this.margin;
     const height = rows - 1 + 2 * this.margin;
     this.svg.setAttribute("viewBox", `${-this.margin} ${-this.margin} ${width} ${height}`);
+    this.svg.style.setProperty("--across", width / Math.max(width, height));
+    this.svg.style.setProperty("--down", height / Math.max(width, height));
     this.svg.replaceChildren();
     const unit = longest / 60;
     const box = this.margin / 2;

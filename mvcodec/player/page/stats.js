@@ -2,7 +2,7 @@
 
 const WINDOW_MS = 1000;
 const LAST = 8;
-const DIGITS = 3;
+const DIGITS = 2;
 
 // Numbers keep their width, so that the line stands still while they change.
 const padded = (text) => text.padStart(DIGITS, "\u2007");
@@ -38,7 +38,7 @@ export class Stats {
       return padded(values.length ? String(Math.round(values.reduce((sum, value) => sum + value, 0) / values.length)) : "–");
     };
     const parts = [
-      `${this.fps} fps`.padEnd(6, "\u2007"),
+      `${padded(String(this.fps || "–"))} fps`,
       `decode ${ms("decode_ms")} ms`,
       `synthesis ${ms("synthesis_ms")} ms`,
       `encode ${ms("encode_ms")} ms`,
