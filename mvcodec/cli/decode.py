@@ -17,11 +17,12 @@ from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesize
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error
-from mvcodec.cli.standard_streams import STANDARD, standard_output
+from mvcodec.cli.standard_streams import STANDARD, standard_input, standard_output
 from mvcodec.container import McapReader
 from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.follow import FollowedFile
 from mvcodec.container.limits import Limits
+from mvcodec.container.remote import is_url
 from mvcodec.decoder import Decoder
 from mvcodec.errors import OutputError, SettingError, StreamError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
@@ -94,6 +95,7 @@ def run(arguments: argparse.Namespace) -> None:
         raise SettingError("--json", "with OUT -", "another OUT: both would be standard output")
     if form == "array" and arguments.view:
         raise SettingError("--view", "single views", "--grid RxC for --format array, which holds a grid")
+    _check_follow(arguments)
     _check_output(form, arguments)
     limits = Limits(**dict(arguments.limit))
     damage: StreamError | None = None
@@ -132,12 +134,18 @@ def run(arguments: argparse.Namespace) -> None:
 def _source(arguments: argparse.Namespace) -> Iterator[str | BinaryIO]:
     """The input. With --follow, Ctrl-C ends it, as its end does."""
     if arguments.input == STANDARD:
-        yield sys.stdin.buffer
+        yield standard_input()
     elif arguments.follow:
         with deferred_interrupt() as interrupted, FollowedFile(Path(arguments.input), interrupted) as file:
             yield cast("BinaryIO", file)
     else:
         yield arguments.input
+
+
+def _check_follow(arguments: argparse.Namespace) -> None:
+    if arguments.follow and (arguments.input == STANDARD or is_url(arguments.input)):
+        expected = "the path of a file that grows (standard input is always read as it comes)"
+        raise SettingError("--follow", f"IN.mcap {arguments.input}", expected)
 
 
 def _check_output(form: str, arguments: argparse.Namespace) -> None:

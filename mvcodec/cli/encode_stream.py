@@ -17,7 +17,7 @@ from mvcodec.capture.recording import Recording, RecordingSettings
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_view import live_view
 from mvcodec.cli.progress import progress
-from mvcodec.cli.standard_streams import STANDARD, standard_input, standard_output
+from mvcodec.cli.standard_streams import INPUT_NAME, STANDARD, standard_input, standard_output
 from mvcodec.container import McapWriter
 from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.declared import DROPPED_KEY
@@ -128,7 +128,7 @@ def _opened(arguments: argparse.Namespace) -> Iterator[Recording]:
     path: Path = arguments.input[0]
     on_damage = _warn if arguments.on_error == "skip" else None
     if str(path) == STANDARD:
-        yield Recording(standard_input(), "standard input", settings, on_damage=on_damage)
+        yield Recording(standard_input(), INPUT_NAME, settings, on_damage=on_damage)
         return
     try:
         file: BinaryIO = path.open("rb")

@@ -12,7 +12,8 @@ from typing import Any, NoReturn, TextIO
 
 import mvcodec
 from mvcodec.cli.arguments import join_negative_values
-from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
+from mvcodec.cli.standard_streams import ReaderGone, checked_streams
+from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
 
 COMMANDS: dict[str, str] = {
     "sample": "render the sample scene as an array folder",
@@ -56,23 +57,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     # OpenCV writes lines of its own to standard error about files that we report; it reads this when loaded.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
     arguments = sys.argv[1:] if argv is None else list(argv)
+    try:
+        with checked_streams(), warnings.catch_warnings():
+            warnings.simplefilter("once", MvCodecWarning)
+            warnings.showwarning = _show_warning
+            return _run(arguments)
+    except ReaderGone:
+        return EXIT_FAILURE
+    except OutputError as error:  # what was printed, at the very end
+        return _fail(error, EXIT_FAILURE)
+
+
+def _run(arguments: Sequence[str]) -> int:
     parsed = _parser(arguments).parse_args(join_negative_values(arguments))
-    with warnings.catch_warnings():
-        warnings.simplefilter("once", MvCodecWarning)
-        warnings.showwarning = _show_warning
-        return _run(parsed)
-
-
-def _run(parsed: argparse.Namespace) -> int:
     try:
         _module(parsed.command).run(parsed)
-        sys.stdout.flush()
     except SettingError as error:
         return _fail(error, EXIT_USAGE)
+    except ReaderGone:
+        return EXIT_FAILURE
     except (MvCodecError, OSError) as error:
-        if isinstance(error, BrokenPipeError):
-            # Whoever read our output has seen enough; without this, Python complains again at exit.
-            sys.stdout = None
         return _fail(error, EXIT_FAILURE)
     except KeyboardInterrupt:
         return _fail("interrupted", EXIT_FAILURE)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
 from mvcodec.closing import Closing
-from mvcodec.errors import InputError
+from mvcodec.errors import InputError, MvCodecWarning
 
 POLL_S = 0.02
 
@@ -18,7 +19,7 @@ class FollowedFile(Closing):
     A reader of MCAP stops by itself where the file is complete.
 
     Args:
-        path: of a file that may be missing yet.
+        path: of a file that may be missing yet, which an MvCodecWarning says at once.
         stopped: asked while waiting; True ends the input where it is.
 
     Raises:
@@ -28,16 +29,18 @@ class FollowedFile(Closing):
     def __init__(self, path: Path, stopped: Callable[[], bool] = lambda: False) -> None:
         self.name = str(path)
         self._stopped = stopped
+        told = False
         while True:
             try:
                 self._file = path.open("rb", buffering=0)
                 break
-            except FileNotFoundError as error:
-                if stopped():
-                    raise InputError(path, error.strerror, "a file that can be read") from None
-                time.sleep(POLL_S)
             except OSError as error:
-                raise InputError(path, error.strerror, "a file that can be read") from None
+                if stopped() or not isinstance(error, FileNotFoundError):
+                    raise InputError(path, error.strerror, "a file that can be read") from None
+            if not told:
+                warnings.warn(f"{path}: not there yet; waiting for it", MvCodecWarning, stacklevel=2)
+                told = True
+            time.sleep(POLL_S)
 
     def read(self, size: int = -1, /) -> bytes:
         """What is there, at most `size` bytes; waits where there is nothing. Empty only once stopped."""
