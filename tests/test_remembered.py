@@ -10,19 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from coding import RANGE_PX, RampMatcher, config, encode, frame_set, make_array, ramp
-from small_arrays import write_array
+from study_runs import study_run
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.capture import open_input
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.encoder import Encoder
 from mvcodec.errors import OutputError
-from mvcodec.evaluation.fingerprint import InputFacts
-from mvcodec.evaluation.points import PointStore
 from mvcodec.evaluation.remembered import MapSpool, Remembered
-from mvcodec.evaluation.study import Study, StudyRun
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.stereo.table import MATCHERS
-from mvcodec.video import disparity_rate
 
 SECONDS = 0.05
 
@@ -120,39 +115,13 @@ def test_streams_are_those_of_the_matcher_itself(tmp_path: Path) -> None:
             assert coded == plain
 
 
-def run_of(folder: Path, span: tuple[float, float] | None, matcher: str = "joint") -> StudyRun:
-    source = open_input([write_array(folder / "array", frames=2)])
-    settings = EncoderConfig(preset="ultrafast", disparity_range_px=span, matcher=matcher)
-    study = Study((30, 40), settings, "linear", ("simulcast",), ("h264",))
-    return StudyRun(study, source, range(2), InputFacts("x", ()), PointStore(folder / "p"), lambda _: None)
-
-
 def test_a_study_matches_once_and_counts_it_in_each_point(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     matcher = SlowMatcher()
     monkeypatch.setitem(MATCHERS, "slow", lambda: matcher)
-    points = run_of(tmp_path, RANGE_PX, "slow").measure()["mvcodec"]
+    points = study_run(tmp_path, RANGE_PX, "slow").measure()["mvcodec"]
     assert matcher.calls == 2, "once for each frame set"
     for point in points:
         assert point.match_seconds is not None
         assert 2 * SECONDS <= point.match_seconds < point.encode_seconds
-
-
-def test_a_point_hangs_on_the_choice_that_the_model_makes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run = run_of(tmp_path, RANGE_PX)
-    own, anchor = run.study.curves[:2]
-    before = [run.depends_on(curve, 30) for curve in (own, anchor)]
-    assert before == [run.depends_on(curve, 30) for curve in (own, anchor)]
-    other = replace(disparity_rate.MODELS["h264"], full=11, half=7)
-    monkeypatch.setitem(disparity_rate.MODELS, "h264", other)
-    after = [run.depends_on(curve, 30) for curve in (own, anchor)]
-    assert run.store.name(before[0]) != run.store.name(after[0])
-    assert before[1] == after[1]
-
-
-def test_a_point_without_a_stated_range_can_be_named(tmp_path: Path) -> None:
-    run = run_of(tmp_path, None)
-    assert run.store.name(run.depends_on(run.study.curves[0], 30))

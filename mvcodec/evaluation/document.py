@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import importlib.metadata
-import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-import mvcodec
 from mvcodec.evaluation.bd import (
     CurveDelta,
     RatePoint,
@@ -16,12 +14,13 @@ from mvcodec.evaluation.bd import (
     compare_curves,
     curve_warnings,
 )
+from mvcodec.evaluation.fingerprint import measuring_versions
 from mvcodec.evaluation.points import CurvePoint
 from mvcodec.evaluation.study import Curve, StudyRun
 from mvcodec.stream import view_name
-from mvcodec.video.pyav import library_versions
 
-LIBRARIES = ("av", "numpy", "opencv-python-headless", "numba", "scipy", "bjontegaard", "matplotlib")
+LIBRARIES = ("bjontegaard", "matplotlib", "scipy")
+"""What turns points into a report."""
 
 KINDS = ("all", "virtual")
 
@@ -39,6 +38,7 @@ def make_document(run: StudyRun, points: Mapping[str, Sequence[CurvePoint]]) -> 
     return {
         "input": array.name or source.name,
         "path": source.name,
+        "pictures": run.facts.pictures,
         "grid": [array.rows, array.cols],
         "size": [array.width, array.height],
         "fps": array.fps,
@@ -62,12 +62,8 @@ def make_document(run: StudyRun, points: Mapping[str, Sequence[CurvePoint]]) -> 
 
 
 def versions() -> dict[str, str]:
-    """Versions of what the figures depend on."""
-    found = {"mvcodec": mvcodec.__version__, "python": platform.python_version()}
-    for name in LIBRARIES:
-        found[name] = importlib.metadata.version(name)
-    machine = f"{platform.machine()}, {platform.system()}"
-    return {**found, **library_versions(), "machine": machine}
+    """Versions of what a report is made with."""
+    return {**measuring_versions(), **{name: importlib.metadata.version(name) for name in LIBRARIES}}
 
 
 def _curve(run: StudyRun, curve: Curve, points: Sequence[CurvePoint]) -> dict[str, Any]:
@@ -78,7 +74,12 @@ def _curve(run: StudyRun, curve: Curve, points: Sequence[CurvePoint]) -> dict[st
         "anchor": None if curve.anchor is None else curve.anchor.name,
         "options": dict(run.options(curve, curve.qps[0])),
         "points": [point.to_json() for point in points],
+        "versions": _distinct(dict(point.versions) for point in points),
     }
+
+
+def _distinct(found: Iterable[dict[str, str]]) -> list[dict[str, str]]:
+    return [dict(items) for items in dict.fromkeys(tuple(sorted(versions.items())) for versions in found)]
 
 
 def _delta(anchor: Sequence[CurvePoint], ours: Sequence[CurvePoint]) -> dict[str, Any]:

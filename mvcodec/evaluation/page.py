@@ -202,11 +202,28 @@ def _method(document: Mapping[str, Any]) -> str:
         + "</code></li>"
         for curve in document["curves"]
     )
-    versions = ", ".join(f"{name} {version}" for name, version in document["versions"].items())
     return (
         f"{text}<details><summary>Settings (at the first QP)</summary><ul>{settings}</ul></details>"
-        f'<p class="soft">Versions: {escape(versions)}</p>'
+        + _versions(document)
     )
+
+
+def _versions(document: Mapping[str, Any]) -> str:
+    """Of the report and of its points, which may have been measured by earlier runs."""
+    made_with = [(_listed(document["versions"]), "this report")]
+    made_with += [
+        (_listed(found), curve["label"]) for curve in document["curves"] for found in curve["versions"]
+    ]
+    users: dict[str, list[str]] = {}
+    for versions, user in made_with:
+        users.setdefault(versions, []).append(user)
+    items = "".join(f"<li>{escape('; '.join(who))}: {escape(what)}</li>" for what, who in users.items())
+    summary = "Versions that the report and its points were made with, as far as they are known"
+    return f"<details><summary>{summary}</summary><ul>{items}</ul></details>"
+
+
+def _listed(versions: Mapping[str, str]) -> str:
+    return ", ".join(f"{name} {version}" for name, version in versions.items())
 
 
 def _number(value: float | None, form: str, unit: str = "") -> str:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,7 @@ class CurvePoint:
         match_seconds: of matching alone, within encode_seconds; None for an anchor.
         file: name of the kept stream in the folder; None for an anchor.
         settings: the encoder's record in that stream's header; None for an anchor.
+        versions: what it was measured with, by name; what is known of it.
     """
 
     qp: int
@@ -57,6 +58,7 @@ class CurvePoint:
     file: str | None = None
     settings: Mapping[str, Any] | None = None
     match_seconds: float | None = None
+    versions: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """As ``report.json`` has it: without the single views."""
@@ -94,7 +96,8 @@ class PointStore:
         """The point of this key, if it was measured; a damaged one counts as not measured."""
         try:
             document = json.loads((self.folder / f"{name}.json").read_bytes())
-            point = _from_document(document["point"])
+            # Points of before they stated versions have those that their key is made of.
+            point = _from_document({"versions": document["depends_on"]["libraries"], **document["point"]})
         except (OSError, ValueError, KeyError, TypeError):
             return None
         complete = point.file is None or (self.folder / point.file).is_file()

@@ -14,7 +14,14 @@ from mvcodec.encoder import EncoderConfig, default_gop, find_matcher
 from mvcodec.errors import OutputError, SettingError
 from mvcodec.evaluation.anchors import ANCHORS, SIMULCAST, Anchor, code_array, sequence_settings
 from mvcodec.evaluation.chain import measure_chain
-from mvcodec.evaluation.fingerprint import ANCHORS_REVISION, CHAIN, InputFacts, code_digest
+from mvcodec.evaluation.fingerprint import (
+    CHAIN,
+    InputFacts,
+    anchors_code,
+    chain_libraries,
+    code_digest,
+    measuring_versions,
+)
 from mvcodec.evaluation.points import BitsSplit, CurvePoint, PointStore
 from mvcodec.evaluation.remembered import MapSpool, Remembered
 from mvcodec.synthesis.table import make_synthesizer
@@ -200,8 +207,8 @@ class StudyRun:
             "curve": OURS if curve.anchor is None else curve.anchor.name,
             "options": self.options(curve, qp),
             "input": self.facts.digest,
-            "code": ANCHORS_REVISION if curve.anchor else self._chain_code,
-            "libraries": library_versions(),
+            "code": anchors_code() if curve.anchor else self._chain_code,
+            "libraries": library_versions() if curve.anchor else chain_libraries(),
         }
         return found if curve.anchor else {**found, "maps": self._map_settings(qp)}
 
@@ -224,6 +231,7 @@ class StudyRun:
             self._on_pictures(self._weight(curve) * len(self.chosen) * len(self.source.array.positions))
             return point
         point = self._anchor_point(curve, qp) if curve.anchor else self._own_point(name, qp)
+        point = replace(point, versions=measuring_versions())
         self.store.keep(name, point, depends_on)
         return point
 
