@@ -21,9 +21,9 @@ from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, view_name
 from mvcodec.synthesis.derived_maps import derive_map
 from mvcodec.synthesis.stand_in import fill_absent
 from mvcodec.video.codec import Planes
-from mvcodec.video.colour import even_size, to_picture
+from mvcodec.video.colour import to_picture
 from mvcodec.video.disparity_code import dequantise
-from mvcodec.video.map_size import coded_size, enlarged, small_size
+from mvcodec.video.map_size import enlarged, small_size, track_sizes
 from mvcodec.video.table import find_codec
 from mvcodec.video.track import TrackDecoder
 
@@ -194,11 +194,7 @@ class Decoder(Closing):
             codec = find_codec(header.codec)
         except SettingError as error:
             raise StreamError(self._name, f"codec {error.found}", error.expected) from None
-        width, height = header.array.width, header.array.height
-        sizes = {
-            TrackKind.TEXTURE: even_size(width, height),
-            TrackKind.DISPARITY: coded_size(width, height, header.disparity_scale),
-        }
+        sizes = track_sizes(header.array.width, header.array.height, header.disparity_scale)
         self._header = header
         self._decoders = {track: TrackDecoder(codec, sizes[track.kind]) for track in header.tracks}
         self._assembler.start(header.tracks)

@@ -9,14 +9,21 @@ from pathlib import Path
 from mvcodec.cli.info import count
 from mvcodec.cli.safety import add_limits
 from mvcodec.container.limits import Limits
-from mvcodec.container.recovery import recover
 from mvcodec.errors import MvCodecWarning, OutputError, SettingError, StreamError
+from mvcodec.output.recovery import recover
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``recover``."""
     parser.add_argument("input", type=Path, metavar="IN.mcap")
     parser.add_argument("output", type=Path, metavar="OUT.mcap")
+    parser.add_argument(
+        "--incomplete",
+        choices=("keep", "drop"),
+        default="keep",
+        help="frame sets in which a camera is missing: keep the others, or drop them up to the next keyframe"
+        " that is complete (default: %(default)s)",
+    )
     add_limits(parser)
     parser.add_argument("--quiet", action="store_true", help="no summary")
 
@@ -27,10 +34,12 @@ def run(arguments: argparse.Namespace) -> None:
         raise SettingError("OUT", arguments.output, "another file than IN.mcap")
     if arguments.output.is_dir():
         raise OutputError(arguments.output, "it is a folder")
-    result = recover(arguments.input, arguments.output, _warn, Limits(**dict(arguments.limit)))
+    limits = Limits(**dict(arguments.limit))
+    result = recover(arguments.input, arguments.output, _warn, limits, arguments.incomplete)
     if not arguments.quiet:
-        lost = f"; {count(result.dropped, 'incomplete frame set')} left out" if result.dropped else ""
-        print(f"{arguments.output}: {count(result.frames, 'frame set')} recovered{lost}")
+        partly = f", {result.incomplete} of them incomplete" if result.incomplete else ""
+        lost = f"; {count(result.dropped, 'frame set')} left out" if result.dropped else ""
+        print(f"{arguments.output}: {count(result.frames, 'frame set')} recovered{partly}{lost}")
 
 
 def _warn(error: StreamError) -> None:

@@ -19,7 +19,7 @@ from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.remote import is_url, open_url
 from mvcodec.errors import InputError, MvCodecWarning, SettingError, StreamError
-from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track
+from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind
 
 
 class McapReader(Closing):
@@ -34,6 +34,7 @@ class McapReader(Closing):
         name: what to call it in messages.
         limits: what is more than that is refused.
         on_damage: told of damage, behind which reading goes on with the next keyframe; None raises it.
+        depth: deliver depth too, which no decoder needs; a damaged image is told and left out.
 
     Raises:
         StreamError: not an MCAP file, none of ours, or one of a newer format version.
@@ -45,6 +46,8 @@ class McapReader(Closing):
         name: str = "input",
         limits: Limits = DEFAULT_LIMITS,
         on_damage: OnDamage | None = None,
+        *,
+        depth: bool = False,
     ) -> None:
         self.name = name
         self._limits = limits
@@ -58,7 +61,8 @@ class McapReader(Closing):
         self._rest = self._chunks.chunks()
         self.header = StreamHeader.from_json(self._first_header().data, name)
         limits.check_header(self.header, name)
-        self._tracks = {track.topic: track for track in (HEADER_TRACK, *self.header.tracks)}
+        depths = [Track(TrackKind.DEPTH, camera) for camera in self.header.array.real] if depth else []
+        self._tracks = {track.topic: track for track in (HEADER_TRACK, *self.header.tracks, *depths)}
 
     @classmethod
     def open(
@@ -66,6 +70,8 @@ class McapReader(Closing):
         source: str | Path | BinaryIO,
         limits: Limits = DEFAULT_LIMITS,
         on_damage: OnDamage | None = None,
+        *,
+        depth: bool = False,
     ) -> McapReader:
         """Open a path or the URL of a file on a web server, or take a binary file or pipe.
 
@@ -74,13 +80,13 @@ class McapReader(Closing):
             StreamError: as the constructor.
         """
         if not isinstance(source, str | Path):
-            return cls(source, str(getattr(source, "name", "input")), limits, on_damage)
+            return cls(source, str(getattr(source, "name", "input")), limits, on_damage, depth=depth)
         try:
             file = open_url(str(source)) if is_url(str(source)) else Path(source).open("rb")  # noqa: SIM115
         except OSError as error:
             raise InputError(source, error.strerror, "a file that can be read") from None
         try:
-            reader = cls(file, str(source), limits, on_damage)
+            reader = cls(file, str(source), limits, on_damage, depth=depth)
         except BaseException:
             file.close()
             raise
@@ -174,7 +180,13 @@ class McapReader(Closing):
                 index, keyframe, self._gap = message.sequence, track is HEADER_TRACK, False
                 if stop is not None and number >= stop:
                     return
-            last = self._packet(track, message, keyframe)
+            try:
+                last = self._packet(track, message, keyframe)
+            except StreamError as error:
+                if self._on_damage is None:
+                    raise
+                self._on_damage(error)
+                continue
             yield number, last
         if self._chunks.cut_off:
             self._warn_of_cut(last)
@@ -206,7 +218,9 @@ class McapReader(Closing):
             return chunk
         index = chunk[-1][1].sequence
         there = {topic for topic, message in chunk if message.sequence == index}
-        if all(track.topic in there for track in self.header.tracks):
+        optional = {track.topic for track in self._tracks.values() if track.kind is TrackKind.DEPTH}
+        due = self._tracks.keys() - {HEADER_TRACK.topic} - (optional - self._chunks.topics)
+        if due <= there:
             return chunk
         return [(topic, message) for topic, message in chunk if message.sequence != index]
 
@@ -227,10 +241,12 @@ class McapReader(Closing):
 
     def _packet(self, track: Track, message: Message, keyframe: bool) -> Packet:
         data = message.data
+        source = f"{self.name}: {track.topic} at {message.log_time / 1e9:.3f} s"
         if track is HEADER_TRACK:
             self._limits.check("max_header_bytes", len(data), f"{self.name}: header bytes")
+        elif track.kind is TrackKind.DEPTH:
+            data = schemas.depth_data(data, source, self.header.array.width, self.header.array.height)
         else:
-            source = f"{self.name}: {track.topic} at {message.log_time / 1e9:.3f} s"
             data = schemas.video_data(data, source, self.header.codec)
         return Packet(track, message.sequence, message.log_time, keyframe, data)
 

@@ -65,6 +65,8 @@ DEPTH_SCHEMA = (
 )
 """The same of depth, which few files have."""
 
+DEPTH_ENCODING = "16UC1"
+
 VIDEO_FORMATS = {"h264": "h264", "hevc": "h265", "av1": "av1"}
 """The header's name of a codec -> foxglove.CompressedVideo's; a name not listed is itself."""
 
@@ -143,13 +145,36 @@ def depth_image(packet: Packet, width: int, height: int) -> bytes:
         frame_id=frame_id(packet.track.camera),
         width=width,
         height=height,
-        encoding="16UC1",
+        encoding=DEPTH_ENCODING,
         step=2 * width,
         data=packet.data,
     )
     message.timestamp.FromNanoseconds(packet.time_ns)
     serialised: bytes = message.SerializeToString()
     return serialised
+
+
+def depth_data(message: bytes, source: str, width: int, height: int) -> bytes:
+    """The pixels inside a serialised foxglove.RawImage, as `depth_image` takes them.
+
+    Raises:
+        StreamError: it is not one, or not of the form that FORMAT.md gives to depth.
+    """
+    try:
+        parsed = RawImage.FromString(message)
+    except DecodeError as error:
+        raise StreamError(source, f"a damaged message ({error})", "foxglove.RawImage") from None
+    found = (parsed.encoding, parsed.width, parsed.height, parsed.step, len(parsed.data))
+    expected = (DEPTH_ENCODING, width, height, 2 * width, 2 * width * height)
+    if found != expected:
+        raise StreamError(source, _layout(found), _layout(expected))
+    data: bytes = parsed.data
+    return data
+
+
+def _layout(found: tuple[str, int, int, int, int]) -> str:
+    encoding, width, height, step, size = found
+    return f"{width}x{height} px of {encoding or 'no encoding'}, {step} bytes a row, {size} bytes"
 
 
 def video_data(message: bytes, source: str, codec: str) -> bytes:

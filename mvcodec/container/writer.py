@@ -86,15 +86,14 @@ class McapWriter(Closing):
         self._size = header.array.width, header.array.height
         self._file.open()
         self._add_channels(header)
-        for packet in packets:
-            if packet.track.kind is TrackKind.DEPTH:
-                name, schema = schemas.DEPTH_SCHEMA
-                channel = (MessageEncoding.Protobuf, name, SchemaEncoding.Protobuf, schema)
-                self._file.add_channel(packet.track.topic, *channel)
         self._file.add_metadata(METADATA_NAME, {"header": first.data.decode(), TOPICS_KEY: self._topics()})
 
     def _message(self, packet: Packet) -> bytes:
         if packet.track.kind is TrackKind.DEPTH:
+            if packet.track.topic not in self._file.channels:
+                name, schema = schemas.DEPTH_SCHEMA
+                channel = (MessageEncoding.Protobuf, name, SchemaEncoding.Protobuf, schema)
+                self._file.add_channel(packet.track.topic, *channel)
             return schemas.depth_image(packet, *self._size)
         return schemas.video_message(packet, self._codec)
 

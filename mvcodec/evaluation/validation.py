@@ -10,9 +10,8 @@ from mvcodec.container.finding import Finding, error, warning
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.message_check import MessageCheck
 from mvcodec.errors import InputError, StreamError
-from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind
-from mvcodec.video.colour import even_size
-from mvcodec.video.map_size import coded_size
+from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track
+from mvcodec.video.map_size import track_sizes
 from mvcodec.video.unit_rules import UNIT_RULES, UnitRules
 
 MAX_FINDINGS = 1000
@@ -122,11 +121,7 @@ class _StreamCheck:
     def _start(self, header: StreamHeader, data: bytes) -> None:
         self._header, self._header_data = header, data
         self._messages = MessageCheck(header, self._add)
-        width, height = header.array.width, header.array.height
-        sizes = {
-            TrackKind.TEXTURE: even_size(width, height),
-            TrackKind.DISPARITY: coded_size(width, height, header.disparity_scale),
-        }
+        sizes = track_sizes(header.array.width, header.array.height, header.disparity_scale)
         rules = UNIT_RULES.get(header.codec)
         if rules is None:
             self._add(error("codec", f"unknown codec {header.codec!r}", HEADER_TRACK.topic))

@@ -7,7 +7,7 @@ import numpy as np
 
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Picture
-from mvcodec.stream import DISPARITY_SCALES
+from mvcodec.stream import DISPARITY_SCALES, TrackKind
 from mvcodec.video.codec import Plane
 from mvcodec.video.colour import even_size, pad_to_even
 
@@ -48,6 +48,14 @@ def small_size(width: int, height: int, scale: int) -> tuple[int, int]:
 def coded_size(width: int, height: int, scale: int) -> tuple[int, int]:
     """Width and height of a map as coded: those of `small_size`, rounded up to even numbers."""
     return even_size(*small_size(width, height, scale))
+
+
+def track_sizes(width: int, height: int, scale: int) -> dict[TrackKind, tuple[int, int]]:
+    """Kind of a video track -> width and height of its pictures as coded."""
+    return {
+        TrackKind.TEXTURE: even_size(width, height),
+        TrackKind.DISPARITY: coded_size(width, height, scale),
+    }
 
 
 def to_coded(codes: Plane, scale: int, median: int) -> Plane:

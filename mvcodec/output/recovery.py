@@ -1,0 +1,228 @@
+"""What can be read of a damaged or unfinished file -> a clean one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import BinaryIO, Literal, get_args
+
+from mvcodec.container import McapReader, McapWriter
+from mvcodec.container.assembly import Assembler, PacketSet
+from mvcodec.container.declared import DROPPED_KEY
+from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.errors import SettingError, StreamError
+from mvcodec.stream import Packet, StreamHeader, Track, TrackKind
+from mvcodec.video.codec import Watch
+from mvcodec.video.map_size import track_sizes
+from mvcodec.video.reference_watch import WATCHES
+
+Incomplete = Literal["keep", "drop"]
+
+Tell = Callable[[StreamError], None]
+
+_HELD_DEPTHS = 2
+"""Frame sets whose depth may wait: the one at hand and the next."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """What `recover` did.
+
+    Attributes:
+        frames: frame sets in the new file.
+        incomplete: how many of them lack a camera's picture or map, or a depth image.
+        dropped: frame sets that were read but left out.
+    """
+
+    frames: int
+    incomplete: int
+    dropped: int
+
+
+def recover(
+    source: str | Path | BinaryIO,
+    target: BinaryIO | Path,
+    tell: Tell,
+    limits: Limits = DEFAULT_LIMITS,
+    incomplete: Incomplete = "keep",
+) -> Recovered:
+    """Copy every frame set that can be decoded, its depth too; the video is copied, not coded again.
+
+    Pictures that build on missing ones are left out, up to their camera's next keyframe.
+
+    Args:
+        tell: takes each damage found.
+        incomplete: of frame sets in which a picture or map is missing, ``keep`` the other cameras, as
+            the decoder does; or ``drop`` them, and all up to the next keyframe that is complete.
+
+    Raises:
+        InputError: the source cannot be opened.
+        StreamError: there is nothing in it that can be decoded, or its codec is unknown.
+        OutputError: the system refuses to write.
+    """
+    if incomplete not in get_args(Incomplete):
+        raise SettingError("incomplete", incomplete, " or ".join(get_args(Incomplete)))
+    with McapReader.open(source, limits, tell, depth=True) as reader, McapWriter(target) as writer:
+        assembler = Assembler(reader.name, tell)
+        assembler.start(reader.header.tracks)
+        tracks = _Tracks(reader.header, reader.name)
+        copier = _Copier(reader.header, writer, tracks, assembler.label, tell, keep=incomplete == "keep")
+        for _, packet in reader.packets():
+            if packet.track.kind is TrackKind.DEPTH:
+                copier.add_depth(packet)
+            else:
+                copier.push(assembler.push(packet))
+        if not reader.cut_off:
+            copier.push(assembler.flush())
+        copier.flush()
+        if not writer.frame_count:
+            kind = "frame set" if incomplete == "keep" else "complete frame set"
+            raise StreamError(reader.name, f"no {kind} that can be decoded", "one at least")
+        if reader.dropped is not None:
+            writer.note({DROPPED_KEY: str(reader.dropped)})
+    return Recovered(writer.frame_count, copier.incomplete, copier.dropped)
+
+
+class _Tracks:
+    """Knows of each track whether its pictures still can be decoded.
+
+    Raises:
+        StreamError: the header's codec is unknown.
+    """
+
+    def __init__(self, header: StreamHeader, name: str) -> None:
+        if header.codec not in WATCHES:
+            raise StreamError(name, f"codec {header.codec}", " or ".join(WATCHES))
+        array = header.array
+        self._sizes = track_sizes(array.width, array.height, header.disparity_scale)
+        self._codec = header.codec
+        self._watches: dict[Track, Watch] = {}
+
+    def lose(self, tracks: Iterable[Track]) -> None:
+        """Pictures of these tracks are missing."""
+        for track in tracks:
+            self._watches.pop(track, None)
+
+    def check(self, packet: Packet, label: str) -> StreamError | None:
+        """Why a packet cannot be decoded; None where it can."""
+        if packet.keyframe:
+            self._watches[packet.track] = WATCHES[self._codec](self._sizes[packet.track.kind])
+        watch = self._watches.get(packet.track)
+        if watch is None:
+            return StreamError(label, "a picture that builds on one that is missing", "a keyframe")
+        try:
+            watch.push(packet.data, label)
+        except StreamError as error:
+            self.lose([packet.track])
+            return error
+        return None
+
+
+class _Copier:
+    """Writes the frame sets that a decoder can decode. All headers of the new file say the same.
+
+    A frame set is written when the next one comes, since its depth stands behind its video.
+    """
+
+    def __init__(
+        self,
+        header: StreamHeader,
+        writer: McapWriter,
+        tracks: _Tracks,
+        label: Callable[[Packet], str],
+        tell: Tell,
+        *,
+        keep: bool,
+    ) -> None:
+        self._header, self._writer, self._tracks = header, writer, tracks
+        self._label, self._tell, self._keep = label, tell, keep
+        self._last: Packet | None = None
+        self._held: list[Packet] = []
+        self._depth: dict[int, dict[Track, Packet]] = {}
+        self._depth_tracks: set[Track] = set()
+        self._absent: set[Track] = set()
+        self._waits = True
+        self.incomplete = self.dropped = 0
+
+    def push(self, sets: list[PacketSet]) -> None:
+        """Take what came of frame sets."""
+        for found in sets:
+            self._push(found)
+
+    def add_depth(self, packet: Packet) -> None:
+        """Take a depth image, which goes with its frame set's pictures."""
+        if self._last is None or packet.index >= self._last.index:
+            self._depth.setdefault(packet.index, {}).setdefault(packet.track, packet)
+            if len(self._depth) > _HELD_DEPTHS:
+                del self._depth[min(self._depth)]
+
+    def flush(self) -> None:
+        """Write the frame set that waits for its depth."""
+        if not self._held:
+            return
+        first = self._held[0]
+        depth = self._depth.pop(first.index, {})
+        self._depth_tracks |= depth.keys()
+        tracks = set(self._header.tracks) | self._depth_tracks
+        there = {packet.track for packet in self._held} | depth.keys()
+        self._tell_absent(tracks - there, first)
+        self.incomplete += not tracks <= there
+        self._writer.push([*self._held, *sorted(depth.values(), key=lambda packet: packet.track.topic)])
+        self._held = []
+
+    def _push(self, found: PacketSet) -> None:
+        first = found.first
+        if self._last is not None and first.time_ns <= self._last.time_ns:
+            self._tracks.lose(self._header.tracks)
+            self._drop()
+            return
+        usable = self._usable(found)
+        complete = len(usable) == len(self._header.tracks)
+        if not (complete or self._keep):
+            self._tell_absent(set(self._header.tracks) - usable.keys(), first)
+            self._drop()
+            return
+        if found.header is not None and self._can_be_shown(usable):
+            self._waits = False
+        if self._waits or not usable:
+            self.dropped += 1
+            return
+        self.flush()
+        packets = [usable[track] for track in self._header.tracks if track in usable]
+        if found.header is not None:
+            if self._last is None and first.index != self._header.first_frame:
+                self._header = replace(self._header, first_frame=first.index)
+            packets.insert(0, replace(found.header, data=self._header.to_json()))
+        self._held, self._last = packets, first
+
+    def _drop(self) -> None:
+        self._waits = True
+        self.dropped += 1
+
+    def _usable(self, found: PacketSet) -> dict[Track, Packet]:
+        """The packets that a decoder can decode."""
+        self._tracks.lose(found.missing)
+        usable = {}
+        for track, packet in found.packets.items():
+            error = self._tracks.check(packet, self._label(packet))
+            if error is None:
+                usable[track] = packet
+            elif track not in self._absent:
+                self._absent.add(track)
+                self._tell(error)
+        return usable
+
+    def _can_be_shown(self, usable: dict[Track, Packet]) -> bool:
+        """Whether there is a camera with picture and map, without which nothing is decoded."""
+        kinds = (TrackKind.TEXTURE, TrackKind.DISPARITY)
+        return any(
+            all(Track(kind, camera) in usable for kind in kinds) for camera in self._header.map_cameras
+        )
+
+    def _tell_absent(self, missing: set[Track], first: Packet) -> None:
+        """Tell which tracks are missing from now on."""
+        for track in sorted(missing - self._absent, key=lambda track: track.topic):
+            label = self._label(replace(first, track=track))
+            self._tell(StreamError(label, "no packet", "one for each track of a frame set"))
+        self._absent = missing
