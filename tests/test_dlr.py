@@ -181,12 +181,8 @@ def test_transposed_arrays_give_transposed_maps() -> None:
 
 
 def test_unknown_names_and_bad_settings_are_refused() -> None:
-    for name, expected in (
-        ("sad+dle", r"sad or sad\+dlr"),
-        ("sad+", r"sad or sad\+dlr"),
-        ("x+dlr", "one of .*sad"),
-    ):
-        with pytest.raises(SettingError, match=f"matcher: found .*, expected {expected}"):
+    for name in ("sad+dle", "sad+", "x+dlr", "x", ""):
+        with pytest.raises(SettingError, match=r"matcher: found .*, expected one of joint, .*, sad, .*\+dlr"):
             matcher_by_name(name)
     for settings, text in (
         ({"jump_px": 0}, "jump_px: found 0"),

@@ -78,7 +78,21 @@ def test_benchmark_puts_other_maps_beside_the_default_ones(array: Path) -> None:
     assert f"{expected['psnr_y']:.2f}" in line.split("|")[1]
     wrong = run("benchmark.py", *options, "--maps", "sgmb")
     assert wrong.returncode == 2
-    assert "invalid choice: 'sgmb'" in wrong.stderr
+    assert wrong.stderr.count("\n") == 1
+    assert "matcher: found sgmb, expected one of joint, sgbm, " in wrong.stderr
+
+
+def test_benchmark_takes_refined_matchers(array: Path) -> None:
+    options = ("--data", array, "--what", "quality", "--synthesizer", "linear", "--json")
+    done = run("benchmark.py", *options, "--matcher", "sad", "--maps", "sad+dlr")
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)["sets"]["small"]
+    refined = json.loads(run("benchmark.py", *options, "--matcher", "sad+dlr").stdout)["sets"]["small"]
+    assert figures["maps"]["sad+dlr"]["psnr_y"] == refined["psnr_y"] != figures["psnr_y"]
+    wrong = run("benchmark.py", *options, "--matcher", "sad+dlx")
+    assert wrong.returncode == 2
+    assert "matcher: found sad+dlx, expected one of" in wrong.stderr
+    assert "+dlr or +dlr-thesis" in wrong.stderr
 
 
 def test_benchmark_skips_what_has_no_virtual_view_and_says_so(array: Path, tmp_path: Path) -> None:

@@ -15,8 +15,8 @@ from mvcodec.array import CameraArray, Position
 from mvcodec.capture import ArraySource, open_input
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
 from mvcodec.frames import DecodedSet, FrameSet
+from mvcodec.layers.refinement import matcher_by_name, matcher_choices
 from mvcodec.stereo.disparity_range import estimate_range
-from mvcodec.stereo.table import make_matcher
 
 
 def scored_views(array: CameraArray) -> list[Position]:
@@ -36,7 +36,7 @@ def match_corners(source: ArraySource, matcher: str) -> tuple[FrameSet, DecodedS
     pictures = {camera: originals.pictures[camera] for camera in array.real}
     range_px = estimate_range(array, [originals], None)
     started = time.perf_counter()
-    maps = make_matcher(matcher).match(array, pictures, range_px)
+    maps = matcher_by_name(matcher).match(array, pictures, range_px)
     seconds = time.perf_counter() - started
     decoded = DecodedSet(array, originals.index, originals.time_ns, pictures, maps, range_px)
     return originals, decoded, seconds
@@ -82,7 +82,7 @@ def add_options(parser: argparse.ArgumentParser, *, data_required: bool) -> None
     """What the measurements share: which sets, matched and rendered by what, and the form of the result."""
     parser.add_argument("--data", type=Path, metavar="DIR", required=data_required)
     parser.add_argument("--sets", type=lambda text: text.split(","), metavar="A,B")
-    parser.add_argument("--matcher", default="joint")
+    parser.add_argument("--matcher", default="joint", metavar="NAME", help=matcher_choices())
     parser.add_argument("--synthesizer", default="layered")
     parser.add_argument("--json", action="store_true")
 

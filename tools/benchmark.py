@@ -28,8 +28,8 @@ from mvcodec.capture import ArraySource, open_input
 from mvcodec.capture.scene import SceneSettings
 from mvcodec.errors import InputError, SettingError
 from mvcodec.evaluation.quality import QualityMeter
+from mvcodec.layers.refinement import matcher_by_name
 from mvcodec.output.sample import write_sample
-from mvcodec.stereo.table import MATCHERS
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.table import make_synthesizer
 
@@ -123,6 +123,9 @@ def rendered(folder: Path) -> ArraySource:
 
 def measure(arguments: argparse.Namespace) -> dict[str, Any]:
     """What was asked for, in the form of ``--json``."""
+    for name in (arguments.matcher, arguments.maps):
+        if name is not None:
+            matcher_by_name(name)  # a misspelt one is told before anything is measured
     if arguments.data is None:
         if arguments.what != "speed":
             raise SettingError(
@@ -145,7 +148,7 @@ def main() -> int:
     add_options(parser, data_required=False)
     parser.add_argument("--what", choices=("quality", "speed"))
     parser.add_argument(
-        "--maps", choices=MATCHERS, help="quality from another matcher's maps too, e.g. sgbm-h"
+        "--maps", metavar="NAME", help="quality from another matcher's maps too, e.g. sgbm-h or sad+dlr"
     )
     return run(parser, measure)
 

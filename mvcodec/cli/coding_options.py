@@ -12,8 +12,8 @@ from mvcodec.cli.arguments import disparity_qp, disparity_range, pair_of_sizes
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import SettingError
 from mvcodec.frames import FrameSet
+from mvcodec.layers.refinement import matcher_choices
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
-from mvcodec.stereo.table import MATCHERS
 from mvcodec.stream import DISPARITY_CAMERAS
 from mvcodec.video.codec import PRESETS
 from mvcodec.video.table import CODECS
@@ -68,7 +68,7 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
         "--matcher",
         default=default.matcher,
         metavar="NAME",
-        help=f"one of {', '.join(MATCHERS)} (default: %(default)s)",
+        help=f"{matcher_choices()} (default: %(default)s)",
     )
     parser.add_argument(
         "--preset",

@@ -1,9 +1,11 @@
-"""Depth Layer Refinement: a disparity map cleaned by layers and the edges of its picture (thesis, chapter 5).
+"""Depth Layer Refinement of our own: a disparity map cleaned by layers and the edges of its picture.
 
-The thesis's steps, on all layers at once: layers are cut where the map jumps and eroded there, since a
-matching window blurs the map by half its size; what remains, the cores, grows back until it meets edges of
-the picture; and in each segment of the picture only the layer that prevails stays. Where the thesis gives
-a layer one value, the cores carry their slope on, since most surfaces are slanted.
+Of chapter 5 of the thesis it keeps the idea: depth changes at edges of the picture only, layers are cleaned
+by erosion, grow back to those edges, and what lies beyond is dropped. Its steps are others (the thesis's are
+in `mvcodec.layers.dlr_thesis`): no DILS split, no convex hulls, no composition. The map is cut where it jumps
+and eroded there, since a matching window blurs it by half its size; what remains, the cores, grows back along
+the way of least distance and change of colour, carrying its slope on, since most surfaces are slanted; in
+each mean-shift segment only the run of disparities that prevails stays, and fills the rest of the segment.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ MATCHERS: dict[str, Callable[[], Matcher]] = {
     "sgbm": lambda: Pairwise(Sgbm()),
     # Plain maps to judge renderers by: one partner.
     "sgbm-h": lambda: Pairwise(Sgbm(), vertical=False),
-    "sad": lambda: Pairwise(FixedWindow()),
+    "sad": lambda: Pairwise(FixedWindow(FixedWindowSettings("sad", subpixel=True))),
     "ssd": lambda: Pairwise(FixedWindow(FixedWindowSettings("ssd", window=9, subpixel=True))),
     "ncc": lambda: Pairwise(FixedWindow(FixedWindowSettings("ncc", window=9, subpixel=True))),
     "census": lambda: Pairwise(FixedWindow(FixedWindowSettings("census", window=9, subpixel=True))),
