@@ -134,6 +134,23 @@ def test_settings_outside_their_range_name_option_value_and_range(
     assert not (tmp_path / "o.mcap").exists()
 
 
+@pytest.mark.parametrize(
+    "option",
+    ["--topics /a", "--fps 3", "--tolerance-ms 3", "--when-behind block", "--on-error stop", "--nominal"],
+)
+def test_options_without_effect_are_refused(array: Path, tmp_path: Path, option: str) -> None:
+    name, *value = option.split()
+    line = fails(2, "encode", array, tmp_path / "o.mcap", name, *value)
+    assert line.startswith(f"mvcodec: error: {name}: found ")
+    assert ("--depth raw16" if name == "--nominal" else f"{array} is no recording") in line
+    assert not (tmp_path / "o.mcap").exists()
+
+
+def test_json_and_the_stream_cannot_both_be_standard_output(array: Path, coded: Path) -> None:
+    assert "--json: found with OUT -" in fails(2, "encode", array, "-", "--json")
+    assert "--json: found with OUT -" in fails(2, "decode", coded, "-", "--format", "mcap", "--json")
+
+
 def test_a_file_that_is_no_mcap(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     for data in (b"", b"no MCAP at all" * 100):

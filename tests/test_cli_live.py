@@ -117,6 +117,22 @@ def test_an_array_folder_goes_out_through_a_pipe(tmp_path: Path) -> None:
     assert _indexes(done.stdout) == [0, 1, 2]
 
 
+def test_what_goes_out_through_a_pipe_is_summed_up_on_standard_error(recorded: Path, tmp_path: Path) -> None:
+    folder, piped = write_array(tmp_path / "array", 1, 2, frames=2), tmp_path / "piped.mcap"
+    for source, options in ((recorded, FAST), (folder, FAST[:4])):
+        told = _through_a_pipe(piped, source, *options)
+        stated = succeeds("info", piped).splitlines()[0].removeprefix(f"{piped}: ")
+        assert told[-1] == f"mvcodec: standard output: {stated}"
+        assert told[:-1] == _through_a_pipe(piped, source, *options, "--quiet")
+
+
+def _through_a_pipe(target: Path, source: Path, *options: str) -> list[str]:
+    """Encode to standard output, that is `target`; returns the lines on standard error."""
+    done = subprocess.run([*COMMAND, "encode", source, "-", *options], capture_output=True, check=True)
+    target.write_bytes(done.stdout)
+    return done.stderr.decode().splitlines()
+
+
 def test_a_reader_that_goes_away_is_one_line(recorded: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)

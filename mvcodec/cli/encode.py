@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,14 +15,22 @@ from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.capture.manifest import read_calibration
 from mvcodec.cli.arguments import add_frames, add_output_options
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
-from mvcodec.cli.encode_stream import Unfinished, add_stream_arguments, encode_stream, is_stream, open_target
+from mvcodec.cli.encode_stream import (
+    Unfinished,
+    add_stream_arguments,
+    encode_stream,
+    is_stream,
+    open_target,
+    refuse_stream_options,
+)
 from mvcodec.cli.info import document, summary
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_view import add_live_view, live_view
 from mvcodec.cli.progress import progress
-from mvcodec.cli.safety import add_chunk_ms, add_on_error
-from mvcodec.cli.standard_streams import STANDARD
-from mvcodec.container import read_info
+from mvcodec.cli.safety import add_chunk_ms
+from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD
+from mvcodec.cli.tallied_writer import TalliedWriter
+from mvcodec.container import McapWriter, read_info
 from mvcodec.depth import require_calibration
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
@@ -56,7 +65,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--nominal", action="store_true", help="accept nominal calibration for --depth")
     add_chunk_ms(parser)
-    add_on_error(parser, "stop")
     add_live_view(parser)
     add_stream_arguments(parser)
     add_frames(parser, "frames of the input to code")
@@ -66,11 +74,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Encode; leaves no output where nothing was encoded, a proper one where something was."""
     _check_output(arguments.output, arguments.input)
+    _check_effect(arguments)
     if is_stream(arguments):
-        encode_stream(arguments, lambda array: _config(array, arguments))
+        writer = encode_stream(arguments, lambda array: _config(array, arguments))
     else:
-        _encode_files(arguments)
-    if str(arguments.output) == STANDARD:
+        writer = _encode_files(arguments)
+    if isinstance(writer, TalliedWriter):
+        if not arguments.quiet:
+            print(f"mvcodec: {OUTPUT_NAME}: {summary(writer.info())}", file=sys.stderr)
         return
     info = read_info(arguments.output)
     if arguments.json:
@@ -79,7 +90,17 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"{arguments.output}: {summary(info)}")
 
 
-def _encode_files(arguments: argparse.Namespace) -> None:
+def _check_effect(arguments: argparse.Namespace) -> None:
+    """Refuse options that would have no effect."""
+    if arguments.json and str(arguments.output) == STANDARD:
+        raise SettingError("--json", "with OUT -", "another OUT: both would be standard output")
+    if arguments.nominal and not arguments.depth:
+        raise SettingError("--nominal", "no --depth", "--depth raw16, for which it accepts the calibration")
+    if not is_stream(arguments):
+        refuse_stream_options(arguments)
+
+
+def _encode_files(arguments: argparse.Namespace) -> McapWriter:
     source = open_input(arguments.input, grid=arguments.grid, real=arguments.real)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     array = source.array
@@ -93,7 +114,7 @@ def _encode_files(arguments: argparse.Namespace) -> None:
         warnings.warn(text, MvCodecWarning, stacklevel=2)
     range_px = find_range(source, chosen, arguments.disparity_range)
     with live_view(arguments) as view:
-        _encode(source, array, chosen, replace(config, disparity_range_px=range_px), arguments, view)
+        return _encode(source, array, chosen, replace(config, disparity_range_px=range_px), arguments, view)
 
 
 def _encode(
@@ -103,7 +124,7 @@ def _encode(
     config: EncoderConfig,
     arguments: argparse.Namespace,
     view: LiveView | None,
-) -> None:
+) -> McapWriter:
     writer = open_target(arguments, view)
     try:
         with (
@@ -124,6 +145,7 @@ def _encode(
             raise
         reason = str(error) or "interrupted"
         raise Unfinished(f"{reason}; {arguments.output} holds {held} of {len(chosen)} frame sets") from error
+    return writer
 
 
 def _check_output(output: Path, inputs: Sequence[Path]) -> None:

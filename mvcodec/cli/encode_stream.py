@@ -17,17 +17,22 @@ from mvcodec.capture.recording import Recording, RecordingSettings
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_view import live_view
 from mvcodec.cli.progress import progress
+from mvcodec.cli.safety import add_on_error
 from mvcodec.cli.standard_streams import INPUT_NAME, STANDARD, standard_input, standard_output
+from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.container import McapWriter
 from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import FrameSet
-from mvcodec.live import LiveEncoding
+from mvcodec.live import LiveEncoding, WhenBehind
 from mvcodec.output.live_view import LiveView
 
 SUFFIX = ".mcap"
+
+STREAM_OPTIONS = ("--topics", "--fps", "--tolerance-ms", "--when-behind", "--on-error")
+DEFAULT_WHEN_BEHIND: WhenBehind = "block"
 
 
 class Unfinished(MvCodecError):
@@ -52,10 +57,12 @@ def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--when-behind",
         choices=("drop", "block"),
-        default="block",
         help="where coding or the reader of OUT is too slow: leave frame sets out, or let INPUT wait"
-        " (default: %(default)s)",
+        f" (default: {DEFAULT_WHEN_BEHIND})",
     )
+    add_on_error(parser, "stop")
+    # What is given is told from what is not, so that it can be refused where it has no effect.
+    parser.set_defaults(on_error=None)
 
 
 def is_stream(arguments: argparse.Namespace) -> bool:
@@ -64,16 +71,27 @@ def is_stream(arguments: argparse.Namespace) -> bool:
     return len(inputs) == 1 and (str(inputs[0]) == STANDARD or inputs[0].suffix.lower() == SUFFIX)
 
 
+def refuse_stream_options(arguments: argparse.Namespace) -> None:
+    """Raise SettingError for an option that only recordings and streams have, and the input is none."""
+    for option in STREAM_OPTIONS:
+        found = getattr(arguments, option.removeprefix("--").replace("-", "_"))
+        if found is not None:
+            expected = f"no such option: {arguments.input[0]} is no recording, an {SUFFIX} file or -"
+            raise SettingError(option, found, expected)
+
+
 def open_target(arguments: argparse.Namespace, view: LiveView | None) -> McapWriter:
     """The writer of OUT, which the live view listens to; frame sets go to standard output one by one."""
     chunk_ms: int | None = arguments.chunk_ms
     if str(arguments.output) == STANDARD:
-        return McapWriter(standard_output(), 0 if chunk_ms is None else chunk_ms, view)
+        return TalliedWriter(standard_output(), 0 if chunk_ms is None else chunk_ms, view)
     return McapWriter(arguments.output, CHUNK_MS if chunk_ms is None else chunk_ms, view)
 
 
-def encode_stream(arguments: argparse.Namespace, make_config: Callable[[CameraArray], EncoderConfig]) -> None:
-    """Code frame sets as they come."""
+def encode_stream(
+    arguments: argparse.Namespace, make_config: Callable[[CameraArray], EncoderConfig]
+) -> McapWriter:
+    """Code frame sets as they come; returns the writer, closed."""
     first, stop = _frames(arguments.frames)
     with live_view(arguments) as view, _opened(arguments) as source:
         config = make_config(source.array)
@@ -83,7 +101,7 @@ def encode_stream(arguments: argparse.Namespace, make_config: Callable[[CameraAr
         if source.calibration_note:
             text = f"{source.name}: {source.calibration_note}; nominal values stand in"
             warnings.warn(text, MvCodecWarning, stacklevel=2)
-        _run(arguments, source, config, islice(source.frame_sets(), first, stop), view)
+        return _run(arguments, source, config, islice(source.frame_sets(), first, stop), view)
 
 
 def _run(
@@ -92,10 +110,10 @@ def _run(
     config: EncoderConfig,
     frame_sets: Iterator[FrameSet],
     view: LiveView | None,
-) -> None:
+) -> McapWriter:
     writer = open_target(arguments, view)
     encoder = Encoder(source.array, config)
-    live = LiveEncoding(encoder, writer, arguments.when_behind)
+    live = LiveEncoding(encoder, writer, arguments.when_behind or DEFAULT_WHEN_BEHIND)
     try:
         with (
             deferred_interrupt() as interrupted,
@@ -114,6 +132,7 @@ def _run(
     if live.dropped:
         text = f"{source.name}: {live.dropped} frame sets dropped, since they came faster than they left"
         warnings.warn(text, MvCodecWarning, stacklevel=2)
+    return writer
 
 
 @contextmanager

@@ -39,7 +39,7 @@ def add_on_error(parser: argparse.ArgumentParser, default: str) -> None:
         "--on-error",
         choices=("skip", "stop"),
         default=default,
-        help="at damage: go on with the next keyframe, or stop (default: %(default)s)",
+        help=f"at damage: go on with the next keyframe, or stop (default: {default})",
     )
 
 

@@ -8,9 +8,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO, TextIO, cast
+from typing import TYPE_CHECKING, BinaryIO, TextIO, cast
 
 from mvcodec.errors import InputError, MvCodecError, OutputError
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 STANDARD = "-"
 """What the user writes for standard input or output."""
@@ -35,13 +38,31 @@ def standard_input() -> BinaryIO:
     return cast("BinaryIO", file)
 
 
-def standard_output() -> BinaryIO:
+class CountedOutput(io.FileIO):
+    """An output that knows how many bytes went there.
+
+    Attributes:
+        written: their number.
+    """
+
+    written = 0
+
+    def write(self, data: ReadableBuffer, /) -> int:
+        """As any raw output: writes all or a part."""
+        count = super().write(data) or 0
+        self.written += count
+        return count
+
+
+def standard_output() -> CountedOutput:
     """Standard output without a buffer, so that what is written is gone, and nothing is left at a failure.
 
     Raises:
         OutputError: it was closed before this process began.
     """
-    return cast("BinaryIO", open(sys.stdout.fileno(), "wb", buffering=0, closefd=False))
+    file = CountedOutput(sys.stdout.fileno(), "wb", closefd=False)
+    file.name = OUTPUT_NAME
+    return file
 
 
 @contextmanager

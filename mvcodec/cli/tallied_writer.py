@@ -1,0 +1,39 @@
+"""What ``info`` would say of a stream that has gone out through a pipe, which nobody can read again."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from mvcodec.cli.standard_streams import CountedOutput
+from mvcodec.container import McapWriter
+from mvcodec.container.info import Bits, StreamInfo
+from mvcodec.output.live_view import LiveView
+from mvcodec.stream import Packet, StreamHeader, TrackKind
+
+
+class TalliedWriter(McapWriter):
+    """Writes to standard output and counts what goes there; arguments as McapWriter's."""
+
+    def __init__(self, target: CountedOutput, chunk_ms: int, listener: LiveView | None) -> None:
+        super().__init__(target, chunk_ms, listener)
+        self._output = target
+        self._header: StreamHeader | None = None
+        self._bytes: Counter[TrackKind] = Counter()
+
+    def push(self, packets: Sequence[Packet]) -> None:
+        """Write one frame set's packets and count them."""
+        super().push(packets)
+        if self._header is None:
+            self._header = StreamHeader.from_json(packets[0].data)
+        for packet in packets:
+            self._bytes[packet.track.kind] += len(packet.data)
+
+    def info(self) -> StreamInfo:
+        """What was written, once the writer is closed and something was."""
+        assert self._header is not None
+        total = 8 * self._output.written
+        texture, disparity = 8 * self._bytes[TrackKind.TEXTURE], 8 * self._bytes[TrackKind.DISPARITY]
+        return StreamInfo(
+            self._header, self.frame_count, Bits(total, texture, disparity, total - texture - disparity)
+        )
