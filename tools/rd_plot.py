@@ -3,8 +3,8 @@
     python tools/rd_plot.py REPORT/report.json [MORE.json ...] -o rd.svg [--metric psnr_y|ssim]
                             [--anchors NAME,..]
 
-Reports of one input share their panels: the anchors once, mvcodec's curves by the names of the reports'
-folders. The suffix of -o says what is written: .svg, .png or .pdf.
+Reports of the same pictures share their panels: anchors once where they have the same points, and what
+differs by the names of the reports' folders. The suffix of -o says what is written: .svg, .png or .pdf.
 """
 
 from __future__ import annotations
@@ -49,18 +49,24 @@ def draw(reports: Sequence[Path], output: Path, metric: str, anchors: Sequence[s
         raise SettingError("--output", output, f"a name that ends in {', '.join(SUFFIXES)}")
     documents = [read(path) for path in reports]
     try:
-        from mvcodec.evaluation import figures
+        from mvcodec.evaluation.figures import saved
+        from mvcodec.evaluation.rate_figure import rd_figure
     except ModuleNotFoundError as error:
         raise MissingExtra(error.name or "matplotlib", "evaluate") from None
     known = {curve["name"] for document in documents for curve in document["curves"]}
     if unknown := [name for name in anchors if name not in known]:
         raise SettingError("--anchors", ",".join(unknown), f"some of {', '.join(sorted(known))}")
-    names = [path.resolve().parent.name if path.name == "report.json" else path.stem for path in reports]
-    figure = figures.rd_figure(documents, metric, names, anchors)
+    figure = rd_figure(documents, metric, names_of(reports), anchors)
     try:
-        output.write_bytes(figures.saved(figure, output.suffix.lower().removeprefix(".")))
+        output.write_bytes(saved(figure, output.suffix.lower().removeprefix(".")))
     except OSError as error:
         raise OutputError(output, error.strerror or error) from None
+
+
+def names_of(reports: Sequence[Path]) -> list[str]:
+    """The folder's name of a report.json, else the file's; whole paths where these are alike."""
+    names = [path.resolve().parent.name if path.name == "report.json" else path.stem for path in reports]
+    return [str(path) if names.count(name) > 1 else name for path, name in zip(reports, names, strict=True)]
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -1,9 +1,9 @@
-"""Figures of rate-distortion reports, in one look: labelled units, colours that everyone can tell apart."""
+"""The look of figures (labelled units, colours that all can tell apart), and those of one report alone."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, cast
 
@@ -11,9 +11,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from mvcodec.frames import Picture
@@ -37,26 +36,18 @@ LOOK: dict[str, Any] = {
     "figure.dpi": 100,
     "savefig.dpi": 200,
     "svg.hashsalt": "mvcodec",  # the same figure gives the same file
+    # TrueType: Matplotlib's own Type 3 fonts are refused by publishers.
+    "pdf.fonttype": 42,
+    "ps.fonttype": 42,
 }
 
-# Okabe and Ito's palette (2008).
-OURS_COLOURS = ("#D55E00", "#000000", "#E69F00", "#8C510A")
-OURS_MARKERS = ("o", "P", "X", "*")
-ANCHOR_STYLES = {
-    "simulcast": ("#0072B2", "s"),
-    "simulcast-b": ("#56B4E9", "D"),
-    "pvs": ("#009E73", "^"),
-    "pvs-rows": ("#CC79A7", "v"),
-}
-CODEC_LINES: dict[str, Any] = {"h264": "-", "hevc": (0, (5, 1.5)), "av1": (0, (1, 1.2))}
+# Of Okabe and Ito's palette (2008), as all colours of figures.
 SPLIT_COLOURS = {"texture": "#0072B2", "disparity": "#E69F00", "rest": "#999999"}
 SPLIT_LABELS = {"texture": "pictures", "disparity": "maps", "rest": "container, headers"}
 
 METRICS = {"psnr_y": "Y-PSNR (dB)", "ssim": "SSIM (luma)"}
-CLASSES = {"all": "All views", "virtual": "Virtual views"}
 
 HEAT_MAP = "cividis"
-OWN_ZORDER = 5
 
 Document = Mapping[str, Any]
 """What a report.json holds."""
@@ -79,44 +70,15 @@ def png(figure: Figure) -> bytes:
     return saved(figure, "png")
 
 
-def rd_figure(
-    documents: Sequence[Document],
-    metric: str = "psnr_y",
-    names: Sequence[str] = (),
-    only: Sequence[str] = (),
-) -> Figure:
-    """Quality over rate: a row for each input, all views on the left and virtual ones on the right.
-
-    Args:
-        documents: reports; those of one input share their panels, with their anchors drawn once.
-        metric: key of METRICS.
-        names: of the reports, to tell apart mvcodec's curves of one input.
-        only: names of the anchors to draw; all where empty.
-    """
-    names = names or [str(document["input"]) for document in documents]
-    documents = [_with_anchors(document, only) for document in documents] if only else documents
-    groups: dict[tuple[Any, ...], list[tuple[str, Document]]] = {}
-    for name, document in zip(names, documents, strict=True):
-        key = (document["input"], tuple(document["grid"]), document["frames"])
-        groups.setdefault(key, []).append((name, document))
-    with look():
-        figure = Figure(figsize=(9.5, 3.9 * len(groups) + 0.6), layout="constrained")
-        axes = figure.subplots(len(groups), len(CLASSES), squeeze=False)
-        labels: dict[str, Line2D] = {}
-        for row, members in zip(axes, groups.values(), strict=True):
-            for panel, kind in zip(row, CLASSES, strict=True):
-                _rd_panel(panel, members, metric, kind, labels)
-            title = _input_title(members[0][1])
-            row[0].set_title(f"{title}: all views" if len(groups) > 1 else CLASSES["all"], loc="left")
-            row[1].set_title(f"{title}: virtual views" if len(groups) > 1 else CLASSES["virtual"], loc="left")
-        lines = sorted(labels.values(), key=lambda line: -line.get_zorder())  # mvcodec's own first
-        figure.legend(handles=lines, loc="outside lower center", ncols=3)
-    return figure
+def own_curve(document: Document) -> Mapping[str, Any]:
+    """mvcodec's curve in a report."""
+    curve: Mapping[str, Any] = document["curves"][0]
+    return curve
 
 
 def split_figure(document: Document) -> Figure:
     """Where mvcodec's bits go: kbit for each frame set, stacked, one bar a QP."""
-    points = _ours(document)["points"]
+    points = own_curve(document)["points"]
     with look():
         figure = Figure(figsize=(4.6, 3.2), layout="constrained")
         axes = figure.subplots()
@@ -196,64 +158,6 @@ def ssim_figure(original: Picture, maps: Mapping[int, NDArray[np.float64]]) -> F
             panel.set_title(f"QP {qp}: SSIM {values.mean():.3f}", loc="left")
         figure.colorbar(image, ax=panels.tolist(), label="SSIM (1 = alike)", shrink=0.9)
     return figure
-
-
-def _rd_panel(
-    axes: Axes, members: Sequence[tuple[str, Document]], metric: str, kind: str, labels: dict[str, Line2D]
-) -> None:
-    drawn: set[str] = set()
-    # Anchors first, so that mvcodec's own curves lie on top.
-    for number, (name, document) in enumerate(members):
-        for curve in sorted(document["curves"], key=lambda curve: curve is _ours(document)):
-            own = curve is _ours(document)
-            label = f"{curve['label']} ({name})" if own and len(members) > 1 else curve["label"]
-            points = [point for point in curve["points"] if point[metric][kind] is not None]
-            if label in drawn or not points:
-                continue
-            drawn.add(label)
-            rates = [point["kbps"] for point in points]
-            values = [point[metric][kind] for point in points]
-            (line,) = axes.plot(rates, values, label=label, **_style(curve, number if own else None))
-            labels.setdefault(label, line)
-    axes.set_xscale("log")
-    axes.set_xlabel("Rate of the whole array (kbit/s)")
-    axes.set_ylabel(METRICS[metric])
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda rate, _: f"{rate:,.10g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    if not drawn:
-        axes.text(0.5, 0.5, "no such view", transform=axes.transAxes, ha="center", color="#666666")
-
-
-def _style(curve: Mapping[str, Any], own: int | None) -> dict[str, Any]:
-    line = CODEC_LINES.get(curve["codec"], "-")
-    if own is not None:
-        number = own % len(OURS_COLOURS)
-        return {
-            "color": OURS_COLOURS[number],
-            "marker": OURS_MARKERS[number],
-            "linestyle": line,
-            "linewidth": 2.4,
-            "markersize": 6.5,
-            "zorder": OWN_ZORDER,
-        }
-    colour, marker = ANCHOR_STYLES.get(curve["anchor"], ("#666666", "."))
-    return {"color": colour, "marker": marker, "linestyle": line, "markerfacecolor": "white"}
-
-
-def _with_anchors(document: Document, names: Sequence[str]) -> Document:
-    curves = [curve for curve in document["curves"] if curve["anchor"] is None or curve["name"] in names]
-    return {**document, "curves": curves}
-
-
-def _ours(document: Document) -> Mapping[str, Any]:
-    curve: Mapping[str, Any] = document["curves"][0]
-    return curve
-
-
-def _input_title(document: Document) -> str:
-    rows, cols = document["grid"]
-    return f"{document['input']}, {rows} x {cols}"
 
 
 def _write_values(panel: Axes, values: NDArray[np.float64], middle: float) -> None:

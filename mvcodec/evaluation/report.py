@@ -22,6 +22,7 @@ from mvcodec.evaluation.document import make_document
 from mvcodec.evaluation.metrics import SSIM_WINDOW, ssim_map
 from mvcodec.evaluation.page import Shown, make_page
 from mvcodec.evaluation.points import CurvePoint
+from mvcodec.evaluation.rate_figure import rd_figure
 from mvcodec.evaluation.study import OURS, StudyRun
 from mvcodec.synthesis.table import make_synthesizer
 
@@ -42,10 +43,10 @@ def write_report(folder: Path, run: StudyRun, points: Mapping[str, Sequence[Curv
         OutputError: the system refuses.
     """
     document = make_document(run, points)
-    rate_distortion = figures.rd_figure([document])
+    rate_distortion = rd_figure([document])
     shown = [
         Shown("Rate and quality", figures.svg(rate_distortion), RD_TEXT),
-        Shown("Rate and structural similarity", figures.svg(figures.rd_figure([document], "ssim")), ""),
+        Shown("Rate and structural similarity", figures.svg(rd_figure([document], "ssim")), ""),
         Shown("Where mvcodec's bits go", figures.svg(figures.split_figure(document)), ""),
         Shown(
             "Quality over the array",
