@@ -276,6 +276,23 @@ def median3(disparity: FloatMap) -> FloatMap:
     return np.asarray(np.median(windows, axis=(2, 3)), np.float32)
 
 
+def restore_thin(voted: FloatMap, tolerance: float, cleaned: FloatMap) -> FloatMap:
+    out = cleaned.copy()
+    height, width = voted.shape
+    for y, x in np.ndindex(height, width):
+        d = voted[y, x]
+        beside = [
+            voted[v, u]
+            for v in (y - 1, y, y + 1)
+            for u in (x - 1, x, x + 1)
+            if (v, u) != (y, x) and 0 <= v < height and 0 <= u < width
+        ]
+        alike = sum(abs(other - d) <= tolerance for other in beside)
+        if d > UNKNOWN and abs(cleaned[y, x] - d) > tolerance and alike >= 2:
+            out[y, x] = d
+    return out
+
+
 def camera_weight(array: CameraArray, camera: Position, viewpoint: Viewpoint, camera_spread: float) -> float:
     """1 / (spread + squared distance in cells), less towards a border with a cell that lacks this camera."""
     cell = array.cell_at(viewpoint)
@@ -312,8 +329,9 @@ def render(
         np.array([source.weight for source in sources], np.float32),
     )
     limits = Limits(settings.tolerance_px, settings.contrast, settings.ratio, settings.denial)
-    voted = median3(vote(moved, ballot, limits))
-    disparity = fill_background(voted, decoded.disparity_range_px[0])
+    voted = vote(moved, ballot, limits)
+    cleaned = restore_thin(voted, settings.tolerance_px, median3(voted))
+    disparity = fill_background(cleaned, decoded.disparity_range_px[0])
     colours, seen_by = blend(sources, disparity, settings)
     rounded = np.floor(colours + 0.5).astype(np.uint8)
     painted = paint_holes(rounded, disparity, seen_by, settings.tolerance_px, settings.hole_reach_px)

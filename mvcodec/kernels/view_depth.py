@@ -17,6 +17,9 @@ FloatMap = NDArray[np.float32]
 UNKNOWN = np.float32(-1e9)
 """Stands for a disparity that no camera knows; below any real one."""
 
+FEWEST_ALIKE = 2
+"""Pixels of a line have as many neighbours on it."""
+
 
 @njit(cache=True, nogil=True)
 def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out: FloatMap) -> None:
@@ -221,6 +224,33 @@ def vote(
             mean[x] = _outvote(
                 x, y, near, who, known, cameras, maps, lumas, shifts, weights, limits, least, share
             )
+
+
+@njit(cache=True, nogil=True)
+def restore_thin(voted: FloatMap, tolerance: float, cleaned: FloatMap, first: int, last: int) -> None:
+    """Give back to a median's result what is no stray pixel but thin, rows first..last-1.
+
+    A known pixel that the median moved to another surface returns where FEWEST_ALIKE of its eight
+    neighbours lie on its own.
+
+    Args:
+        voted: float32 (H, W), px or UNKNOWN, as `vote` left it.
+        tolerance: px within which disparities are one surface.
+        cleaned: float32 (H, W), the median of `voted`, changed in place.
+    """
+    height, width = voted.shape
+    near = np.float32(tolerance)
+    for y in range(first, last):
+        for x in range(width):
+            d = voted[y, x]
+            if d <= UNKNOWN or abs(cleaned[y, x] - d) <= near:
+                continue
+            alike = -1  # the pixel is like itself
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    alike += abs(voted[v, u] - d) <= near
+            if alike >= FEWEST_ALIKE:
+                cleaned[y, x] = d
 
 
 @njit(cache=True, nogil=True)

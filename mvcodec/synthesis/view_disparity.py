@@ -73,5 +73,6 @@ def view_disparity(
         voted,
     )
     cleaned = np.asarray(cv2.medianBlur(voted, 3), np.float32)
+    run_in_bands(pool, height, view_depth.restore_thin, voted, ballot.tolerance_px, cleaned)
     run_in_bands(pool, height, view_depth.fill_background, cleaned, background_px)
     return cleaned
