@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
+import socket
 import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -63,6 +64,9 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(body=True)
 
     def _answer(self, body: bool) -> None:
+        if self.path.endswith("secret.mcap"):
+            self.send_error(403)
+            return
         if not self.path.endswith("x.mcap"):
             self.send_error(404)
             return
@@ -120,3 +124,47 @@ def test_a_server_without_ranges_is_named(url: str) -> None:
     _Handler.ranges = False
     with pytest.raises(InputError, match="does not serve ranges"):
         Decoder.open(url)
+
+
+def test_info_and_render_take_urls(content: bytes, url: str, tmp_path: Path) -> None:
+    assert json.loads(succeeds("info", url, "--json"))["bits"]["total"] == 8 * len(content)
+    succeeds("render", url, tmp_path / "a.png", "--synthesizer", "linear", "--frames", ":1")
+    assert (tmp_path / "a.png").exists()
+
+
+def test_a_server_that_does_not_answer_is_no_missing_file(tmp_path: Path) -> None:
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))  # nobody listens there
+        address = f"127.0.0.1:{unused.getsockname()[1]}"
+        for command in (
+            ("decode", f"http://{address}/x.mcap", tmp_path),
+            ("info", f"http://{address}/x.mcap"),
+        ):
+            line = fails(1, *command)
+            assert f"http://{address}/x.mcap: found no connection to {address} (Connection refused)" in line
+
+
+def test_what_a_server_answers_is_told(url: str) -> None:
+    with pytest.raises(InputError, match="found no such file"):
+        Decoder.open(url.replace("x.mcap", "y.mcap"))
+    with pytest.raises(InputError, match="found the answer 403 Forbidden"):
+        Decoder.open(url.replace("x.mcap", "secret.mcap"))
+
+    (["validate {}", "recover {} o.mcap", "play {}", "encode {} o.mcap", "decode x.mcap {}", "encode a {}"],)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "validate {}",
+        "recover {} o.mcap",
+        "play {}",
+        "encode {} o.mcap",
+        "decode x.mcap {}",
+        "encode array {}",
+    ],
+)
+def test_where_no_address_is_taken_it_is_named_as_it_was_given(command: str) -> None:
+    address = "http://127.0.0.1:1/x.mcap"
+    line = fails(2, *command.format(address).split())
+    assert f"found {address}, expected a file or folder on this machine" in line

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource
 from mvcodec.cli.arguments import disparity_qp, disparity_range, pair_of_sizes
+from mvcodec.cli.paths import local_path
 from mvcodec.encoder import Encoder, EncoderConfig
 from mvcodec.errors import SettingError
 from mvcodec.frames import FrameSet
@@ -41,7 +41,7 @@ def as_option(error: SettingError) -> SettingError:
 
 def add_input(parser: argparse.ArgumentParser, what: str) -> None:
     """``INPUT``, ``--grid`` and ``--real``."""
-    parser.add_argument("input", type=Path, nargs="+", metavar="INPUT", help=what)
+    parser.add_argument("input", type=local_path, nargs="+", metavar="INPUT", help=what)
     parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
     parser.add_argument(
         "--real",

@@ -15,6 +15,7 @@ from typing import BinaryIO, cast
 from mvcodec.array import Viewpoint
 from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, pair_of_sizes, view
 from mvcodec.cli.interrupt import deferred_interrupt
+from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error
 from mvcodec.cli.standard_streams import STANDARD, standard_input, standard_output
@@ -51,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "output",
-        type=Path,
+        type=local_path,
         metavar="OUT",
         help="a folder; for --format mosaic a .mp4 or .png file; for --format mcap a .mcap file or -",
     )

@@ -26,6 +26,7 @@ from mvcodec.cli.encode_stream import (
 from mvcodec.cli.info import document, summary
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_view import add_live_view, live_view
+from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_chunk_ms
 from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD
@@ -47,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "an array folder, R*C videos in row order with --grid, or a recording with --topics: an .mcap"
         " file or - for standard input",
     )
-    parser.add_argument("output", type=Path, metavar="OUT.mcap", help="or - for standard output")
+    parser.add_argument("output", type=local_path, metavar="OUT.mcap", help="or - for standard output")
     rate = parser.add_mutually_exclusive_group()
     rate.add_argument(
         "--qp", type=int, metavar="N", help=f"constant QP, 1..51, av1 1..63 (default: {default.qp})"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mvcodec.capture.manifest import read_calibration
 from mvcodec.cli.arguments import add_frames, add_output_options, positive_int
+from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error
 from mvcodec.container.limits import Limits
@@ -24,7 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``export-points``."""
     parser.add_argument("input", metavar="IN.mcap", help="or its URL")
     parser.add_argument(
-        "output", type=Path, metavar="OUT", help="a .mcap file of all frames, or a .ply file of the first one"
+        "output",
+        type=local_path,
+        metavar="OUT",
+        help="a .mcap file of all frames, or a .ply file of the first one",
     )
     parser.add_argument("--stride", type=positive_int, default=1, metavar="N", help="every Nth pixel")
     parser.add_argument(

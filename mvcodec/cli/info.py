@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from mvcodec.container import StreamInfo, read_info
@@ -13,7 +12,7 @@ from mvcodec.container import StreamInfo, read_info
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``info``."""
-    parser.add_argument("input", type=Path, metavar="IN.mcap")
+    parser.add_argument("input", metavar="IN.mcap", help="or its URL on a web server")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 

@@ -7,9 +7,9 @@ import re
 from contextlib import suppress
 from functools import partial
 from importlib.util import find_spec
-from pathlib import Path
 
 from mvcodec.cli.arguments import add_synthesizer
+from mvcodec.cli.paths import local_path
 from mvcodec.errors import MissingExtra
 from mvcodec.synthesis.table import QUICKER, make_synthesizer
 
@@ -20,9 +20,9 @@ MAX_PORT = 65535
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``play``."""
-    parser.add_argument("input", type=Path, metavar="FILE.mcap")
+    parser.add_argument("input", type=local_path, metavar="FILE.mcap")
     parser.add_argument(
-        "--original", type=Path, metavar="ARRAY", help="array folder to measure the pictures against"
+        "--original", type=local_path, metavar="ARRAY", help="array folder to measure the pictures against"
     )
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=_port, default=0, help="0 takes any free one (default: 0)")

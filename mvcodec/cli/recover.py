@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 import warnings
-from pathlib import Path
 
 from mvcodec.cli.info import count
+from mvcodec.cli.paths import local_path
 from mvcodec.cli.safety import add_limits
 from mvcodec.container.limits import Limits
 from mvcodec.errors import MvCodecWarning, OutputError, SettingError, StreamError
@@ -15,8 +15,8 @@ from mvcodec.output.recovery import recover
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``recover``."""
-    parser.add_argument("input", type=Path, metavar="IN.mcap")
-    parser.add_argument("output", type=Path, metavar="OUT.mcap")
+    parser.add_argument("input", type=local_path, metavar="IN.mcap")
+    parser.add_argument("output", type=local_path, metavar="OUT.mcap")
     parser.add_argument(
         "--incomplete",
         choices=("keep", "drop"),

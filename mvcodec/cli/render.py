@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, pair_of_sizes, view
+from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
 from mvcodec.container import McapReader, read_info
 from mvcodec.decoder import Decoder
@@ -30,10 +31,10 @@ FROZEN_SECONDS = 2
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``render``."""
-    parser.add_argument("input", type=Path, metavar="FILE.mcap")
+    parser.add_argument("input", metavar="FILE.mcap", help="or its URL on a web server")
     parser.add_argument(
         "output",
-        type=Path,
+        type=local_path,
         metavar="OUT",
         help=f"a file *{', *'.join(WRITERS)}; {STILL_SUFFIX} holds the first picture",
     )
@@ -98,7 +99,7 @@ def run(arguments: argparse.Namespace) -> None:
 def _check_settings(arguments: argparse.Namespace) -> None:
     """Refuse what cannot be done before any work is."""
     output = arguments.output
-    if arguments.input.resolve() == output.resolve():
+    if Path(arguments.input).resolve() == output.resolve():
         raise SettingError("OUT", output, "another file than FILE.mcap")
     if output.is_dir():
         raise OutputError(output, "it is a folder")
@@ -119,12 +120,12 @@ def _places(arguments: argparse.Namespace, array: CameraArray, count: int) -> tu
     return walk_shape(arguments.path, array, count)
 
 
-def _frame_count(path: Path, frames: slice | None) -> int:
+def _frame_count(source: str, frames: slice | None) -> int:
     """How many frame sets are selected; 0 where the decoder will refuse them."""
-    with McapReader.open(path) as reader:
+    with McapReader.open(source) as reader:
         count = reader.frame_count
     if count is None:  # cut short: counted by reading it
-        count = read_info(path).frames
+        count = read_info(source).frames
     return len(range(*(frames or slice(None)).indices(count)))
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from mvcodec.capture.scene import DEFAULT_SCENE, SCENES, SceneSettings, make_scene
 from mvcodec.cli.arguments import add_output_options, pair_of_sizes, positive_int
 from mvcodec.cli.info import count
+from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
 from mvcodec.output.sample import write_sample
 
@@ -15,7 +15,7 @@ from mvcodec.output.sample import write_sample
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``sample``."""
     parser.add_argument(
-        "output", type=Path, metavar="OUTDIR", help="a folder; an existing one is written into"
+        "output", type=local_path, metavar="OUTDIR", help="a folder; an existing one is written into"
     )
     parser.add_argument(
         "--scene",

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 from typing import Any
 
 from mvcodec.cli.info import count
+from mvcodec.cli.paths import local_path
 from mvcodec.cli.safety import add_limits
 from mvcodec.container.finding import Finding, Severity
 from mvcodec.container.limits import Limits
 from mvcodec.errors import MvCodecError
-from mvcodec.evaluation.validation import validate
+from mvcodec.evaluation.validation import FileKind, examine
+from mvcodec.stream import HEADER_TRACK
+
+_KINDS: dict[FileKind | None, str] = {
+    FileKind.VIEWS: f" (video topics without {HEADER_TRACK.topic}: checked as such)",
+    FileKind.POINTS: " (point clouds: checked as such)",
+}
+"""What is said of a file that is not one of FORMAT.md's."""
 
 
 class NotClean(MvCodecError):
@@ -21,27 +28,29 @@ class NotClean(MvCodecError):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``validate``."""
-    parser.add_argument("input", type=Path, metavar="FILE.mcap")
+    parser.add_argument("input", type=local_path, metavar="FILE.mcap")
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     add_limits(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Print what is wrong; the exit code is 0 only where nothing is."""
-    findings = validate(arguments.input, Limits(**dict(arguments.limit)))
+    found = examine(arguments.input, Limits(**dict(arguments.limit)))
+    findings, said = found.findings, _KINDS.get(found.kind, "")
     if arguments.json:
         document = {
             "file": str(arguments.input),
+            "kind": found.kind,
             "clean": not findings,
             "findings": [_document(finding) for finding in findings],
         }
         print(json.dumps(document))
     else:
-        print("\n".join(_line(finding) for finding in findings) or f"{arguments.input}: clean")
+        print("\n".join(_line(finding) for finding in findings) or f"{arguments.input}: clean{said}")
     if findings:
         errors = sum(finding.severity is Severity.ERROR for finding in findings)
-        found = f"{count(errors, 'error')}, {count(len(findings) - errors, 'warning')}"
-        raise NotClean(f"{arguments.input}: {found}")
+        counts = f"{count(errors, 'error')}, {count(len(findings) - errors, 'warning')}"
+        raise NotClean(f"{arguments.input}: {counts}{said}")
 
 
 def _document(finding: Finding) -> dict[str, Any]:

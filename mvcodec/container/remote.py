@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import os
 import re
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, BinaryIO, cast
@@ -14,6 +16,8 @@ _URL = re.compile(r"https?://", re.IGNORECASE)
 
 BLOCK_BYTES = 1 << 11
 """Fetched beyond what is asked for, so that small records don't cost a request each."""
+
+NOT_FOUND = 404
 
 
 def is_url(source: str) -> bool:
@@ -75,9 +79,34 @@ class _RemoteFile:
     def _failing(self) -> Iterator[None]:
         try:
             yield
-        except FileNotFoundError:
-            raise InputError(self.name, "no such file", "a file on a web server") from None
         except self._failures as error:
-            text = str(error) or type(error).__name__
-            found = "a server that does not serve ranges" if "range requests" in text else text
-            raise InputError(self.name, found, "a file on a web server that serves ranges") from None
+            raise InputError(self.name, _reason(error), "a file on a web server that serves ranges") from None
+
+
+def _reason(error: Exception) -> str:
+    """What is found instead of the file.
+
+    When it opens a file, fsspec turns everything that goes wrong into a FileNotFoundError; its cause says
+    what it was.
+    """
+    import aiohttp
+
+    if isinstance(error, FileNotFoundError):
+        cause = error.__cause__
+        return _reason(cause) if isinstance(cause, Exception) else "no such file"
+    if isinstance(error, aiohttp.ClientResponseError):
+        answer = f"the answer {error.status} {error.message}".rstrip()
+        return "no such file" if error.status == NOT_FOUND else answer
+    if isinstance(error, aiohttp.ClientConnectorError):
+        return f"no connection to {error.host}:{error.port} ({_system_words(error.os_error)})"
+    if isinstance(error, TimeoutError):
+        return "no answer in time"
+    text = str(error) or type(error).__name__
+    return "a server that does not serve ranges" if "range requests" in text else text
+
+
+def _system_words(error: OSError) -> str:
+    """The system's own words: asyncio puts others in their place, and an address may have no number."""
+    if error.errno is None or isinstance(error, socket.gaierror):
+        return error.strerror or str(error)
+    return os.strerror(error.errno)
