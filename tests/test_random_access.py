@@ -150,8 +150,6 @@ def test_what_a_server_answers_is_told(url: str) -> None:
     with pytest.raises(InputError, match="found the answer 403 Forbidden"):
         Decoder.open(url.replace("x.mcap", "secret.mcap"))
 
-    (["validate {}", "recover {} o.mcap", "play {}", "encode {} o.mcap", "decode x.mcap {}", "encode a {}"],)
-
 
 @pytest.mark.parametrize(
     "command",
