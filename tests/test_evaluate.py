@@ -169,6 +169,68 @@ def test_other_settings_are_measured_anew(array: Path, measured: Path, tmp_path:
     assert maps[1][0] < maps[0][0]
 
 
+def change_points(folder: Path, curve: str, codec: str, decibel: float, rate: float, qp: int = 0) -> None:
+    """Shift an anchor's measured points, or the one of a QP: by so many dB, and by a factor of the rate."""
+    for path in (folder / "points").glob("*.json"):
+        document = json.loads(path.read_text())
+        depends_on, point = document["depends_on"], document["point"]
+        named = (depends_on["curve"], depends_on["options"]["codec"]) == (curve, codec)
+        if named and qp in (0, point["qp"]):
+            point["kbps"] *= rate
+            for view in point["quality"]["views"]:
+                view["psnr_y"] += decibel
+            path.write_text(json.dumps(document))
+
+
+def test_weak_figures_are_told_in_every_place(array: Path, measured: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(measured, tmp_path / "copy"))
+    change_points(folder, "simulcast", "hevc", 5, 1)
+    change_points(folder, "simulcast-b", "hevc", 0, 0.001)
+    change_points(folder, "pvs", "h264", 0, 1000, qp=36)
+    change_points(folder, "pvs", "hevc", -50, 1)
+    done = mvcodec("evaluate", array, "--output", folder, "--qp", "24,30,36,42", *FAST)
+    assert done.returncode == 0, done.stderr
+    document, page = report(folder), (folder / "report.html").read_text()
+    dent = "PVS, all views, H.264: not monotonic: 1 of 4 points are left out of BD figures"
+    assert dent in document["warnings"]
+    told = {dent}
+    for name, label, reason in (
+        ("simulcast-hevc", "simulcast, no B-frames, HEVC", "all views: short overlap: "),
+        ("simulcast-b-hevc", "simulcast, B-frames, HEVC", "all views: no rate in common: no BD-PSNR"),
+        ("pvs-hevc", "PVS, all views, HEVC", "all views: no quality in common: no BD-rate"),
+    ):
+        warnings = document["bd_rate"][name]["warnings"]
+        assert any(text.startswith(reason) for text in warnings), warnings
+        told.add(f"BD figures against {label}: {'; '.join(warnings)}")
+    for text in told:
+        assert f"mvcodec: warning: {text}" in done.stderr.splitlines()
+        assert f"<li>{text}</li>" in page
+
+
+def test_the_page_says_where_an_anchor_is_ahead(array: Path, measured: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(measured, tmp_path / "copy"))
+    change_points(folder, "simulcast", "hevc", 50, 1)
+    change_points(folder, "simulcast-b", "hevc", 30, 0.001)
+    change_points(folder, "pvs", "hevc", -50, 1)
+    change_points(folder, "pvs-rows", "hevc", -50, 20)
+    change_points(folder, "pvs-rows", "hevc", 100, 1, qp=24)
+    change_points(folder, "pvs-rows", "hevc", 100, 1, qp=30)
+    succeeds("evaluate", array, "--output", folder, "--qp", "24,30,36,42", *FAST)
+    page, deltas = (folder / "report.html").read_text(), report(folder)["bd_rate"]
+    lowest = report(folder)["curves"][0]["points"][-1]["kbps"]
+    for name, label, words in (
+        ("simulcast-hevc", "simulcast, no B-frames, HEVC", "ahead everywhere, from "),
+        ("simulcast-b-hevc", "simulcast, B-frames, HEVC", f"ahead everywhere, from {lowest:.0f} kbit/s, "),
+        ("pvs-hevc", "PVS, all views, HEVC", "not in this range"),
+        ("pvs-rows-hevc", "PVS, each row, HEVC", "{kbps:.0f} kbit/s, {psnr_y:.2f} dB"),
+    ):
+        found = deltas[name]["overtaken"]
+        assert (found is None) == (words == "not in this range")
+        assert bool(deltas[name]["anchor_ahead_kbps"]) == (found is not None)
+        cell = words.format(**found or {})
+        assert re.search(rf"<td>{label}</td>(<td>[^<]*</td>){{4}}<td>{re.escape(cell)}", page), (label, cell)
+
+
 @pytest.fixture
 def heeding_ctrl_c() -> Iterator[None]:
     """Let commands started here heed SIGINT: a shell's background jobs, as tests may be, inherit none."""

@@ -72,6 +72,7 @@ def run(arguments: argparse.Namespace) -> None:
     for package in PACKAGES:
         if find_spec(package) is None:
             raise MissingExtra(package, EXTRA)
+    from mvcodec.evaluation.document import every_warning
     from mvcodec.evaluation.fingerprint import examine
     from mvcodec.evaluation.points import PointStore
     from mvcodec.evaluation.report import FILES, write_report
@@ -90,11 +91,7 @@ def run(arguments: argparse.Namespace) -> None:
         bar.total = measuring.picture_count
         points = measuring.measure()
     document = write_report(output, measuring, points)
-    for text in document["warnings"]:
-        warnings.warn(text, MvCodecWarning, stacklevel=2)
-    doubtful = [name for name, delta in document["bd_rate"].items() if delta["warnings"]]
-    if doubtful:
-        text = f"BD figures against {', '.join(doubtful)} rest on little; report.html says why"
+    for text in every_warning(document):
         warnings.warn(text, MvCodecWarning, stacklevel=2)
     if not arguments.quiet:
         print(table(document))

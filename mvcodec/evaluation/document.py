@@ -61,6 +61,19 @@ def make_document(run: StudyRun, points: Mapping[str, Sequence[CurvePoint]]) -> 
     }
 
 
+def every_warning(document: Mapping[str, Any]) -> list[str]:
+    """What a reader of a report must know, a line each: of the input, of curves, of BD figures."""
+    labels = {curve["name"]: curve["label"] for curve in document["curves"]}
+    return [
+        *document["warnings"],
+        *(
+            f"BD figures against {labels[name]}: {'; '.join(delta['warnings'])}"
+            for name, delta in document["bd_rate"].items()
+            if delta["warnings"]
+        ),
+    ]
+
+
 def versions() -> dict[str, str]:
     """Versions of what a report is made with."""
     return {**measuring_versions(), **{name: importlib.metadata.version(name) for name in LIBRARIES}}

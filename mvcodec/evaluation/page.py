@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
+from mvcodec.evaluation.document import every_warning
+
 STYLE = """
 :root { --ink: #1a1a1a; --soft: #5c5c5c; --line: #dcdcdc; --ours: #D55E00; }
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: #fff; max-width: 64rem;
@@ -131,10 +133,7 @@ def _overtaken(delta: Mapping[str, Any]) -> str:
 
 
 def _warnings(document: Mapping[str, Any]) -> str:
-    labels = {curve["name"]: curve["label"] for curve in document["curves"]}
-    warnings = list(document["warnings"])
-    for name, delta in document["bd_rate"].items():
-        warnings += [f"BD figures against {labels[name]}, {text}" for text in delta["warnings"]]
+    warnings = every_warning(document)
     if not warnings:
         return ""
     items = "".join(f"<li>{escape(text)}</li>" for text in warnings)
