@@ -69,7 +69,7 @@ class JointSettings:
 
     colour_limit: float = 60
     bit_cost: float = 4
-    bit_limit: float = 90
+    bit_limit: float = 82
     lone_cost: int = 12
     outside_cost: int = 100
     small_step: float = 35
