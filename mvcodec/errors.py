@@ -42,7 +42,23 @@ class InputError(MvCodecError):
 
 
 class StreamError(InputError):
-    """A coded stream (container, header or packet) is damaged or not ours."""
+    """A coded stream (container, header or packet) is damaged or not ours.
+
+    Args:
+        topic: where in the stream, or None for the stream as a whole.
+        time_ns: when in the stream, or None.
+    """
+
+    def __init__(
+        self,
+        source: str | Path,
+        found: object,
+        expected: str,
+        topic: str | None = None,
+        time_ns: int | None = None,
+    ) -> None:
+        super().__init__(source, found, expected)
+        self.topic, self.time_ns = topic, time_ns
 
 
 class MissingReference(StreamError):

@@ -13,7 +13,7 @@ import pytest
 from broken_files import BROKEN, BROKEN_CONTAINERS, coded_sets, written
 from coding import encode, make_array
 from command_line import mvcodec, succeeds
-from damage import small_file
+from damage import chunk_ends, small_file
 
 from mvcodec.errors import InputError
 from mvcodec.evaluation.validation import validate
@@ -70,11 +70,34 @@ def test_findings_name_topic_and_time(folder: Path) -> None:
     assert {finding.code for finding in later} == {"missing-reference"}
 
 
+def test_order_and_damaged_chunks_name_topic_and_time_as_decode_does(folder: Path) -> None:
+    found = [finding for finding in validate(folder / "same_time.mcap") if finding.code == "order"]
+    assert [(f.topic, f.time_ns, f.severity) for f in found] == [
+        ("/camera/r00_c00/video", 500_000_000, "error")
+    ]
+    assert found[0].message == "a time not after that of frame 5, expected times that increase"
+    found = [finding for finding in validate(folder / "out_of_order.mcap") if finding.code == "order"]
+    assert {(f.topic, f.time_ns) for f in found} >= {("/camera/r00_c00/video", 500_000_000)}
+    content = bytearray(small_file())
+    content[chunk_ends(bytes(content))[2] - 100] ^= 16
+    path = folder.parent / "flipped.mcap"
+    path.write_bytes(content)
+    (chunk,) = validate(path)
+    assert (chunk.code, chunk.topic, chunk.time_ns) == ("chunk", "/camera/r00_c00/calibration", 10**9)
+    assert "/camera/r00_c00/calibration and 7 more topics, 1.000..1.400 s" in chunk.message
+
+
+def test_a_damaged_message_index_names_its_topic(folder: Path) -> None:
+    (found,) = (f for f in validate(folder / "message_index.mcap") if f.code == "message-index")
+    assert found.topic == "/mvcodec/header"
+
+
 def test_the_command_prints_findings_and_says_by_its_exit_code(folder: Path) -> None:
     clean = folder / "clean.mcap"
     assert succeeds("validate", clean) == f"{clean}: clean\n"
     assert json.loads(succeeds("validate", clean, "--json")) == {
         "file": str(clean),
+        "kind": "array",
         "clean": True,
         "findings": [],
     }

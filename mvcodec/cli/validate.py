@@ -12,7 +12,14 @@ from mvcodec.cli.safety import add_limits
 from mvcodec.container.finding import Finding, Severity
 from mvcodec.container.limits import Limits
 from mvcodec.errors import MvCodecError
-from mvcodec.evaluation.validation import validate
+from mvcodec.evaluation.validation import FileKind, examine
+from mvcodec.stream import HEADER_TRACK
+
+_KINDS: dict[FileKind | None, str] = {
+    FileKind.VIEWS: f" (video topics without {HEADER_TRACK.topic}: checked as such)",
+    FileKind.POINTS: " (point clouds: checked as such)",
+}
+"""What is said of a file that is not one of FORMAT.md's."""
 
 
 class NotClean(MvCodecError):
@@ -28,20 +35,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Print what is wrong; the exit code is 0 only where nothing is."""
-    findings = validate(arguments.input, Limits(**dict(arguments.limit)))
+    found = examine(arguments.input, Limits(**dict(arguments.limit)))
+    findings, said = found.findings, _KINDS.get(found.kind, "")
     if arguments.json:
         document = {
             "file": str(arguments.input),
+            "kind": found.kind,
             "clean": not findings,
             "findings": [_document(finding) for finding in findings],
         }
         print(json.dumps(document))
     else:
-        print("\n".join(_line(finding) for finding in findings) or f"{arguments.input}: clean")
+        print("\n".join(_line(finding) for finding in findings) or f"{arguments.input}: clean{said}")
     if findings:
         errors = sum(finding.severity is Severity.ERROR for finding in findings)
-        found = f"{count(errors, 'error')}, {count(len(findings) - errors, 'warning')}"
-        raise NotClean(f"{arguments.input}: {found}")
+        counts = f"{count(errors, 'error')}, {count(len(findings) - errors, 'warning')}"
+        raise NotClean(f"{arguments.input}: {counts}{said}")
 
 
 def _document(finding: Finding) -> dict[str, Any]:

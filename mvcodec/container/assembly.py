@@ -100,7 +100,8 @@ class Assembler:
         if self._last is not None and first.time_ns <= self._last.time_ns:
             found = f"a time not after that of frame {self._last.index}"
             label = f"{self._name}: frame {first.index} at {first.time_ns / 1e9:.3f} s"
-            self._tell(StreamError(label, found, "times that increase"))
+            topic = first.track.topic
+            self._tell(StreamError(label, found, "times that increase", topic, first.time_ns))
         header, self._header = self._header, None
         if header is not None and header.index != first.index:
             header = None
@@ -112,4 +113,5 @@ class Assembler:
         """Tell it, once for each frame set."""
         if packet.index != self._told:
             self._told = packet.index
-            self._tell(StreamError(self.label(packet), found, "frame sets in order, each once"))
+            expected, topic = "frame sets in order, each once", packet.track.topic
+            self._tell(StreamError(self.label(packet), found, expected, topic, packet.time_ns))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -24,6 +25,7 @@ from mcap.records import (
 
 from mvcodec.container.data_section import SUMMARY_RECORDS, DataSection
 from mvcodec.container.exact_file import ExactFile
+from mvcodec.container.file_index import FileIndex, read_index
 from mvcodec.container.finding import Finding, error
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.records import (
@@ -63,6 +65,15 @@ class CheckedMessage:
     record: Message
 
 
+@dataclass(frozen=True, slots=True)
+class _DamagedChunk:
+    """A chunk that cannot be read, and the channels that the message indexes behind it name."""
+
+    why: str
+    times_ns: tuple[int, int] | None
+    channels: list[int]
+
+
 class FileCheck:
     """Yields a file's messages in order; afterwards `findings` says what is wrong with their container.
 
@@ -81,11 +92,34 @@ class FileCheck:
         self.metadata: dict[str, dict[str, str]] = {}
         self._seen = DataSection()
         self._message_indexes: dict[int, MessageIndex] | None = None
+        self._damaged: _DamagedChunk | None = None
         self._time_ns: int | None = None
         self._whole = True
+        self._unknown: set[int] = set()
+        self._index: FileIndex | None = None
+
+    @property
+    def indexed(self) -> bool:
+        """Whether there is a summary, which names all topics; known with the first message."""
+        return self._index is not None
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """Topic -> the name of its schema, as far as the file or its summary has said by now."""
+        found = {}
+        for known in (self._index, self._seen):
+            if known is None:
+                continue
+            for channel in known.channels.values():
+                schema = known.schemas.get(channel.schema_id)
+                found[channel.topic] = "" if schema is None else schema.name
+        return found
 
     def messages(self) -> Iterator[CheckedMessage]:
         """Go through the file."""
+        with suppress(RecordError):  # a damaged summary is told where it stands
+            self._index = read_index(self._file, self._limits)
+        self._file.seek(0)
         if self._file.read(len(MAGIC)) != MAGIC:
             self._tell("magic", "the file does not begin as MCAP does")
             if not find_chunk(self._file, self._limits):
@@ -111,8 +145,31 @@ class FileCheck:
                 self._tell("record", f"a record of kind {opcode} among the data")
         self._end_message_indexes()
 
-    def _tell(self, code: str, message: str) -> None:
-        self.findings.append(error(code, message, time_ns=self._time_ns))
+    def _tell(self, code: str, message: str, topic: str | None = None, time_ns: int | None = None) -> None:
+        time_ns = self._time_ns if time_ns is None else time_ns
+        self.findings.append(error(code, message, topic, time_ns))
+
+    def _topic(self, number: int) -> str | None:
+        """The topic of a channel, if it is known."""
+        channel = self._known(number).channels.get(number)
+        return None if channel is None else channel.topic
+
+    def _known(self, number: int) -> DataSection | FileIndex:
+        """What declares a channel: the data so far or, where that was lost, the summary."""
+        return self._seen if self._index is None or number in self._seen.channels else self._index
+
+    def _tell_damaged(self, damaged: _DamagedChunk) -> None:
+        """Tell of a damaged chunk, whose topics the message indexes behind it name."""
+        numbers = damaged.channels or list(self._seen.channels)
+        topics = sorted({topic for topic in map(self._topic, numbers) if topic is not None})
+        lost = f"a chunk of {topics[0]}" if topics else "a chunk"
+        if len(topics) > 1:
+            lost += f" and {len(topics) - 1} more topics"
+        text, time_ns = f"damage ({damaged.why}): {lost}", None
+        if damaged.times_ns is not None:
+            time_ns, end_ns = damaged.times_ns
+            text += f", {time_ns / 1e9:.3f}..{end_ns / 1e9:.3f} s"
+        self._tell("chunk", text, topics[0] if topics else None, time_ns)
 
     def _next(self) -> tuple[int, bytes, int] | None:
         """The next record and its place; None where there is none (which is told)."""
@@ -139,8 +196,10 @@ class FileCheck:
 
     def _chunk(self, content: bytes, place: int) -> Iterator[CheckedMessage]:
         self._message_indexes = {}
+        times_ns = None
         try:
             head, packed = parse_chunk(content, self._limits)
+            times_ns = (head.start_ns, head.end_ns)
             index = ChunkIndex(
                 chunk_length=HEAD.size + len(content),
                 chunk_start_offset=place,
@@ -153,16 +212,17 @@ class FileCheck:
                 uncompressed_size=head.size,
             )
             self._seen.chunks.append(index)
-            if not head.crc:
-                self._tell("chunk", "a chunk without a checksum")
             messages = self._unpacked(unpack(head, packed, self._limits))
         except RecordError as damage:
-            self._tell("chunk", f"damage ({damage})")
+            self._damaged = _DamagedChunk(str(damage), times_ns, [])
             self._whole = False
             return
         times = [message.record.log_time for message in messages]
-        if times and (min(times), max(times)) != (head.start_ns, head.end_ns):
-            self._tell("chunk", "a chunk whose times are not those of its messages")
+        first = messages[0].topic if messages else None
+        if not head.crc:
+            self._tell("chunk", "a chunk without a checksum", first, head.start_ns)
+        if times and (min(times), max(times)) != times_ns:
+            self._tell("chunk", "a chunk whose times are not those of its messages", first, min(times))
         yield from messages
 
     def _unpacked(self, data: bytes) -> list[CheckedMessage]:
@@ -186,13 +246,21 @@ class FileCheck:
         seen, number = self._seen, record.channel_id
         self._time_ns = record.log_time
         seen.count(number, record.log_time)
-        channel = seen.channels.get(number)
+        known = self._known(number)
+        channel = known.channels.get(number)
+        if channel is None or (known is not seen and self._whole):
+            self._tell_unknown(number)
         if channel is None:
-            self._tell("channel", f"a message of unknown channel {number}")
             return None, number
-        schema = seen.schemas.get(channel.schema_id)
+        schema = known.schemas.get(channel.schema_id)
         name = "" if schema is None else schema.name
         return CheckedMessage(channel.topic, name, channel.message_encoding, record), number
+
+    def _tell_unknown(self, number: int) -> None:
+        """Tell of a channel that was not declared before its messages, once."""
+        if number not in self._unknown:
+            self._unknown.add(number)
+            self._tell("channel", f"a message of unknown channel {number}")
 
     def _declare(self, opcode: int, content: bytes) -> None:
         kind = Schema if opcode == Opcode.SCHEMA else Channel
@@ -204,9 +272,9 @@ class FileCheck:
             self._tell("channel", f"two different {kind.__name__.lower()}s of number {record.id}")
         if opcode == Opcode.CHANNEL:
             if record.schema_id and record.schema_id not in self._seen.schemas:
-                self._tell("channel", f"{record.topic}: unknown schema {record.schema_id}")
+                self._tell("channel", f"unknown schema {record.schema_id}", record.topic)
             if any(other.topic == record.topic and other.id != record.id for other in known.values()):
-                self._tell("channel", f"{record.topic}: two channels")
+                self._tell("channel", "two channels", record.topic)
 
     def _outside(self, opcode: int, content: bytes, place: int) -> Iterator[CheckedMessage]:
         """A record of the data section outside of chunks."""
@@ -239,17 +307,24 @@ class FileCheck:
         if self._message_indexes is None:
             self._tell("message-index", "a message index without a chunk before it")
             return
-        if self._message_indexes.pop(found.channel_id, None) != found:
-            self._tell("message-index", f"the message index of channel {found.channel_id} is wrong")
+        if self._damaged is not None:
+            self._damaged.channels.append(found.channel_id)
+        elif self._message_indexes.pop(found.channel_id, None) != found:
+            text = f"the message index of channel {found.channel_id} is wrong"
+            self._tell("message-index", text, self._topic(found.channel_id))
         if self._seen.chunks:
             chunk = self._seen.chunks[-1]
             chunk.message_index_offsets[found.channel_id] = place
             chunk.message_index_length += HEAD.size + len(content)
 
     def _end_message_indexes(self) -> None:
-        for number in self._message_indexes or ():
-            self._tell("message-index", f"no message index of channel {number} behind its chunk")
-        self._message_indexes = None
+        if self._damaged is not None:
+            self._tell_damaged(self._damaged)
+        else:
+            for number in self._message_indexes or ():
+                text = f"no message index of channel {number} behind its chunk"
+                self._tell("message-index", text, self._topic(number))
+        self._message_indexes = self._damaged = None
 
     def _parsed(self, kind: Any, content: bytes) -> Any:
         """A record of the MCAP library's kind; None (told) where it is damaged."""

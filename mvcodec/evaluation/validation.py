@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
+from typing import BinaryIO, Protocol
 
 from mvcodec.container.assembly import Assembler, PacketSet
+from mvcodec.container.declared import METADATA_NAME
 from mvcodec.container.file_check import CheckedMessage, FileCheck
 from mvcodec.container.finding import Finding, error, warning
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.message_check import MessageCheck
+from mvcodec.container.topic_check import POINTS, VIDEO
 from mvcodec.errors import InputError, StreamError
+from mvcodec.evaluation.topic_validation import TopicValidation
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track
 from mvcodec.video.map_size import track_sizes
 from mvcodec.video.unit_rules import UNIT_RULES, UnitRules
@@ -18,6 +25,31 @@ MAX_FINDINGS = 1000
 """A file that is wrong everywhere is not described further than that."""
 
 _SECOND_NS = 1_000_000_000
+_TOPICS_NAMED = 5
+
+
+class FileKind(StrEnum):
+    """What a file is, which says what rules it must keep."""
+
+    ARRAY = "array"
+    """A file of FORMAT.md."""
+    VIEWS = "views"
+    """Video topics without our header, as `decode --format mcap` and others write."""
+    POINTS = "points"
+    """Point clouds, as `export-points` and others write."""
+
+
+@dataclass(frozen=True, slots=True)
+class Validation:
+    """What was found.
+
+    Attributes:
+        kind: None: the file is nothing that there are rules for.
+        findings: by time, those of the file as a whole first; empty for a clean file.
+    """
+
+    kind: FileKind | None
+    findings: list[Finding]
 
 
 def validate(path: Path, limits: Limits = DEFAULT_LIMITS) -> list[Finding]:
@@ -26,21 +58,57 @@ def validate(path: Path, limits: Limits = DEFAULT_LIMITS) -> list[Finding]:
     Raises:
         InputError: the system refuses to open it.
     """
+    return examine(path, limits).findings
+
+
+def examine(path: Path, limits: Limits = DEFAULT_LIMITS) -> Validation:
+    """What a file is, and everything in it that is against the rules for such a file.
+
+    Raises:
+        InputError: the system refuses to open it.
+    """
     try:
         with path.open("rb") as file:
+            kind = _kind(file, limits)
+            file.seek(0)
             check = FileCheck(file, limits)
-            stream = _StreamCheck(str(path), limits)
+            content = _CONTENTS[kind](str(path), limits)
             for message in check.messages():
-                stream.push(message)
-                if len(check.findings) + len(stream.findings) > MAX_FINDINGS:
+                content.push(message)
+                if len(check.findings) + len(content.findings) > MAX_FINDINGS:
                     break
             else:
-                stream.end(check.metadata)
+                content.end(check)
     except OSError as failure:
         raise InputError(path, failure.strerror, "a file that can be read") from None
-    return sorted(
-        [*check.findings, *stream.findings], key=lambda found: -1 if found.time_ns is None else found.time_ns
-    )
+    findings = [*check.findings, *content.findings]
+    return Validation(kind, sorted(findings, key=lambda f: -1 if f.time_ns is None else f.time_ns))
+
+
+def _kind(file: BinaryIO, limits: Limits) -> FileKind | None:
+    """What a file is, by the topics that it names; ours may be damaged up to a header far behind."""
+    check = FileCheck(file, limits)
+    for message in check.messages():
+        if message.topic == HEADER_TRACK.topic:
+            return FileKind.ARRAY
+        if check.indexed:
+            break
+    if HEADER_TRACK.topic in check.topics or METADATA_NAME in check.metadata:
+        return FileKind.ARRAY
+    schemas = set(check.topics.values())
+    if VIDEO in schemas:
+        return FileKind.VIEWS
+    return FileKind.POINTS if POINTS in schemas else None
+
+
+class _ContentCheck(Protocol):
+    """Checks what is in the messages of a file."""
+
+    findings: list[Finding]
+
+    def push(self, message: CheckedMessage) -> None: ...
+
+    def end(self, check: FileCheck) -> None: ...
 
 
 class _StreamCheck:
@@ -80,7 +148,7 @@ class _StreamCheck:
             if track is not None and data is not None:
                 self._push_unit(track, message, data)
 
-    def end(self, metadata: dict[str, dict[str, str]]) -> None:
+    def end(self, check: FileCheck) -> None:
         """Check what can be known at the end only."""
         if self._header is None:
             self._add(error("header", f"no header on {HEADER_TRACK.topic}"))
@@ -88,7 +156,7 @@ class _StreamCheck:
         self._tell_sets(self._assembler.flush())
         assert self._messages is not None
         self.findings += self._messages.end()
-        said = metadata.get("mvcodec", {}).get("header")
+        said = check.metadata.get(METADATA_NAME, {}).get("header")
         if said is None:
             self._add(warning("metadata", "no metadata record mvcodec with the header"))
         elif said.encode() != self._header_data:
@@ -168,4 +236,31 @@ class _StreamCheck:
                 self._add(error("incomplete", text, track.topic, found.first.time_ns))
 
     def _tell_order(self, failure: StreamError) -> None:
-        self._add(error("order", str(failure), None, None if self._now is None else self._now[1]))
+        text = f"{failure.found}, expected {failure.expected}"
+        self._add(error("order", text, failure.topic, failure.time_ns))
+
+
+class _UnknownCheck:
+    """A file that there are no rules for: says so, unless its container is damaged and may hold anything."""
+
+    def __init__(self, name: str, limits: Limits) -> None:
+        del name, limits
+        self.findings: list[Finding] = []
+
+    def push(self, message: CheckedMessage) -> None:
+        """Nothing is known of any message."""
+
+    def end(self, check: FileCheck) -> None:
+        """See the class."""
+        if check.topics or not check.findings:
+            topics = ", ".join(sorted(check.topics)[:_TOPICS_NAMED]) or "none"
+            expected = f"{HEADER_TRACK.topic}, {VIDEO} or {POINTS}"
+            self.findings.append(error("kind", f"topics: {topics}; expected one with {expected}"))
+
+
+_CONTENTS: dict[FileKind | None, Callable[[str, Limits], _ContentCheck]] = {
+    FileKind.ARRAY: _StreamCheck,
+    FileKind.VIEWS: lambda _name, _limits: TopicValidation(),
+    FileKind.POINTS: lambda _name, _limits: TopicValidation(),
+    None: _UnknownCheck,
+}

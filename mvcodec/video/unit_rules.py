@@ -26,10 +26,20 @@ _EXPECTED_COLOUR = (_BT709, _BT709, _BT709)
 
 
 class UnitRules(Protocol):
-    """Checks the access units of one track in order."""
+    """Checks the access units of one track in order.
 
-    def push(self, data: bytes, keyframe: bool) -> Broken:
-        """What is wrong with an access unit; `keyframe`: a header came with it."""
+    Attributes:
+        keyframe: the last unit is one, as far as it could be parsed.
+    """
+
+    keyframe: bool
+
+    def push(self, data: bytes, keyframe: bool | None) -> Broken:
+        """What is wrong with an access unit.
+
+        Args:
+            keyframe: a header came with it; None: there are no headers, and any unit may be a keyframe.
+        """
         ...
 
 
@@ -37,17 +47,19 @@ class H264Rules:
     """H.264: one picture a unit, no B slices, IDR with SPS and PPS where a keyframe is due, tags.
 
     Args:
-        kind: what the track carries.
+        kind: what the track carries; None where no header says it: profile, colour and size are free.
         size: (width, height) as coded.
     """
 
-    def __init__(self, kind: TrackKind, size: tuple[int, int]) -> None:
+    def __init__(self, kind: TrackKind | None, size: tuple[int, int]) -> None:
         self._kind, self._size = kind, size
+        self.keyframe = False
         self._parser = H264Parser()
         self._next: int | None = None
 
-    def push(self, data: bytes, keyframe: bool) -> Broken:
+    def push(self, data: bytes, keyframe: bool | None) -> Broken:
         """See `UnitRules`."""
+        self.keyframe = False
         if not data.startswith((b"\x00\x00\x01", b"\x00\x00\x00\x01")):
             yield "annex-b", "no start code at its beginning"
         try:
@@ -55,8 +67,9 @@ class H264Rules:
         except NalError as error:
             yield "nal", f"a damaged NAL unit ({error})"
             return
-        yield from self._structure(unit, keyframe)
-        for sequence in unit.sequence_sets:
+        self.keyframe = unit.idr
+        yield from self._structure(unit, unit.idr if keyframe is None else keyframe)
+        for sequence in unit.sequence_sets if self._kind is not None else ():
             yield from self._sequence(sequence)
         yield from self._references(unit)
 
@@ -119,15 +132,17 @@ class HevcRules:
 
     def __init__(self) -> None:
         self._references = HevcReferences()
+        self.keyframe = False
 
-    def push(self, data: bytes, keyframe: bool) -> Broken:
+    def push(self, data: bytes, keyframe: bool | None) -> Broken:
         """See `UnitRules`."""
         units = nal_units(data)
         kinds = {hevc_syntax.nal_kind(unit) for unit in units}
         pictures = sum(map(hevc_syntax.begins_picture, units))
         if pictures != 1:
             yield "one-picture", f"{pictures} pictures in one message"
-        idr = bool(kinds & hevc_syntax.IDR_KINDS)
+        self.keyframe = idr = bool(kinds & hevc_syntax.IDR_KINDS)
+        keyframe = idr if keyframe is None else keyframe
         if keyframe != idr:
             yield (
                 "keyframe",
@@ -149,15 +164,19 @@ class Av1Rules:
 
     def __init__(self) -> None:
         self._references = Av1References()
+        self.keyframe = False
 
-    def push(self, data: bytes, keyframe: bool) -> Broken:
+    def push(self, data: bytes, keyframe: bool | None) -> Broken:
         """See `UnitRules`."""
+        self.keyframe = False
         try:
             kinds = [kind for kind, _ in av1_syntax.obus(data)]
             missing = self._references.push(data)
         except NalError as error:
             yield "obu", f"a damaged OBU ({error})"
             return
+        self.keyframe = self._references.key_frame
+        keyframe = self.keyframe if keyframe is None else keyframe
         frames = sum(kind in (av1_syntax.FRAME, av1_syntax.FRAME_HEADER) for kind in kinds)
         if frames != 1:
             yield "one-picture", f"{frames} frames in one message"
@@ -170,7 +189,7 @@ class Av1Rules:
             yield "missing-reference", missing
 
 
-UNIT_RULES: dict[str, Callable[[TrackKind, tuple[int, int]], UnitRules]] = {
+UNIT_RULES: dict[str, Callable[[TrackKind | None, tuple[int, int]], UnitRules]] = {
     "h264": H264Rules,
     "hevc": lambda _kind, _size: HevcRules(),
     "av1": lambda _kind, _size: Av1Rules(),
