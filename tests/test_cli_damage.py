@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from command_line import COMMAND, fails, mvcodec, succeeds
 from damage import COUNT, GOP, chunk_ends, outcome, small_file
+from PIL import Image
 
 from mvcodec.container import McapReader
 from mvcodec.decoder import Decoder
@@ -151,6 +152,27 @@ def test_limits_are_settings(file: bytes, tmp_path: Path) -> None:
     line = fails(1, "decode", source, tmp_path / "out", "--limit", "max_cameras=1")
     assert "real cameras: found 2, expected at most max_cameras = 1" in line
     assert "NAME one of max_record_bytes" in fails(2, "decode", source, tmp_path / "out", "--limit", "size=1")
+    assert "N at least 1" in fails(2, "decode", source, tmp_path / "out", "--limit", "max_cameras=0")
+
+
+@pytest.mark.parametrize("command", ["render {} x.png", "play {} --no-browser", "export-points {} x.ply"])
+def test_limits_are_settings_wherever_a_file_is_opened(file: bytes, tmp_path: Path, command: str) -> None:
+    source = tmp_path / "in.mcap"
+    source.write_bytes(file)
+    line = fails(1, *command.format(source).split(), "--limit", "max_views=1")
+    assert "views: found 2, expected at most max_views = 1" in line
+
+
+def test_render_stops_at_damage_or_goes_on_behind_it(flipped: Path, tmp_path: Path) -> None:
+    arguments = ("render", flipped, tmp_path / "x.gif", *QUICK)
+    assert "at 1.000..1.400 s: found damage" in fails(1, *arguments)
+    assert not (tmp_path / "x.gif").exists()
+    done = mvcodec(*arguments, "--on-error", "skip")
+    assert done.returncode == 0
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("mvcodec: warning: ")
+    with Image.open(tmp_path / "x.gif") as animation:
+        assert getattr(animation, "n_frames", 1) == COUNT - GOP
 
 
 def test_follow_reads_a_file_while_it_grows(file: bytes, tmp_path: Path) -> None:

@@ -17,12 +17,11 @@ from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesize
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
-from mvcodec.cli.safety import add_limits, add_on_error
+from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.cli.standard_streams import STANDARD, standard_input, standard_output
 from mvcodec.container import McapReader
 from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.follow import FollowedFile
-from mvcodec.container.limits import Limits
 from mvcodec.container.remote import is_url
 from mvcodec.decoder import Decoder
 from mvcodec.errors import OutputError, SettingError, StreamError
@@ -98,11 +97,10 @@ def run(arguments: argparse.Namespace) -> None:
         raise SettingError("--view", "single views", "--grid RxC for --format array, which holds a grid")
     _check_follow(arguments)
     _check_output(form, arguments)
-    limits = Limits(**dict(arguments.limit))
     damage: StreamError | None = None
     with (
         _source(arguments) as source,
-        Decoder.open(source, arguments.frames, arguments.on_error, limits) as decoder,
+        Decoder.open(source, arguments.frames, arguments.on_error, limits_of(arguments)) as decoder,
         ThreadPoolExecutor(THREADS, "render") as pool,
         progress("decode", _frame_total(source, arguments.frames), quiet=arguments.quiet) as bar,
         ExitStack() as outputs,

@@ -10,8 +10,7 @@ from mvcodec.capture.manifest import read_calibration
 from mvcodec.cli.arguments import add_frames, add_output_options, positive_int
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
-from mvcodec.cli.safety import add_limits, add_on_error
-from mvcodec.container.limits import Limits
+from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.container.point_writer import PointWriter
 from mvcodec.decoder import Decoder
 from mvcodec.depth import points_of, require_calibration
@@ -54,9 +53,8 @@ def run(arguments: argparse.Namespace) -> None:
         raise OutputError(target, "it is a folder")
     if target.resolve() == Path(arguments.input).resolve():
         raise SettingError("OUT", target, "another file than IN.mcap")
-    limits = Limits(**dict(arguments.limit))
     with (
-        Decoder.open(arguments.input, arguments.frames, arguments.on_error, limits) as decoder,
+        Decoder.open(arguments.input, arguments.frames, arguments.on_error, limits_of(arguments)) as decoder,
         progress("export", None, quiet=arguments.quiet) as bar,
         PointWriter(target) as writer,
     ):

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 
 from mvcodec.cli.arguments import add_synthesizer
 from mvcodec.cli.paths import local_path
+from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.errors import MissingExtra
 from mvcodec.synthesis.table import QUICKER, make_synthesizer
 
@@ -28,12 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=_port, default=0, help="0 takes any free one (default: 0)")
     parser.add_argument("--no-browser", action="store_true", help="print the URL, open no browser")
     add_synthesizer(parser)
-    parser.add_argument(
-        "--on-error",
-        choices=("skip", "stop"),
-        default="skip",
-        help="at damage, play on behind it or stop there (default: %(default)s)",
-    )
+    add_on_error(parser, "skip")
+    add_limits(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -53,6 +50,7 @@ def run(arguments: argparse.Namespace) -> None:
         arguments.input,
         partial(make_synthesizer, arguments.synthesizer),
         partial(make_synthesizer, quicker) if quicker else None,
+        limits_of(arguments),
     )
     try:
         if arguments.original is not None:

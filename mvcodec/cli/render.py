@@ -14,7 +14,9 @@ from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, pair_of_sizes, view
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
-from mvcodec.container import McapReader, read_info
+from mvcodec.cli.safety import add_limits, add_on_error, limits_of
+from mvcodec.container import McapReader
+from mvcodec.container.limits import Limits
 from mvcodec.decoder import Decoder
 from mvcodec.errors import OutputError, SettingError, StreamError
 from mvcodec.frames import Picture
@@ -67,6 +69,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_synthesizer(parser)
     add_frames(parser, "frames of the file")
+    add_on_error(parser, "stop")
+    add_limits(parser)
     add_output_options(parser)
 
 
@@ -75,8 +79,9 @@ def run(arguments: argparse.Namespace) -> None:
     synthesizer = make_synthesizer(arguments.synthesizer)
     write = find_writer(arguments.output)
     _check_settings(arguments)
-    with Decoder.open(arguments.input, arguments.frames) as decoder:
-        array, count = decoder.header.array, _frame_count(arguments.input, arguments.frames)
+    limits = limits_of(arguments)
+    with Decoder.open(arguments.input, arguments.frames, arguments.on_error, limits) as decoder:
+        array, count = decoder.header.array, _frame_count(arguments, limits)
         places = _places(arguments, array, count)
         sets = iter(decoder)
         first = next(sets, None)
@@ -120,13 +125,18 @@ def _places(arguments: argparse.Namespace, array: CameraArray, count: int) -> tu
     return walk_shape(arguments.path, array, count)
 
 
-def _frame_count(source: str, frames: slice | None) -> int:
+def _frame_count(arguments: argparse.Namespace, limits: Limits) -> int:
     """How many frame sets are selected; 0 where the decoder will refuse them."""
-    with McapReader.open(source) as reader:
+    on_damage = _say_nothing if arguments.on_error == "skip" else None  # the decoder will say it
+    with McapReader.open(arguments.input, limits, on_damage) as reader:
         count = reader.frame_count
-    if count is None:  # cut short: counted by reading it
-        count = read_info(source).frames
-    return len(range(*(frames or slice(None)).indices(count)))
+        if count is None:  # cut short: counted by reading it
+            count = max((number + 1 for number, _ in reader.packets()), default=0)
+    return len(range(*(arguments.frames or slice(None)).indices(count)))
+
+
+def _say_nothing(_: StreamError) -> None:
+    pass
 
 
 def _counted(pictures: Iterator[Picture], bar: tqdm[None]) -> Iterator[Picture]:

@@ -14,9 +14,9 @@ def limit(text: str) -> tuple[str, int]:
     """``NAME=N``: one of the limits on what a file may ask for."""
     match = re.fullmatch(r"([a-z_]+)=(\d{1,18})", text)
     names = [field.name for field in fields(Limits)]
-    if match is None or match[1] not in names:
+    if match is None or match[1] not in names or int(match[2]) < 1:
         raise argparse.ArgumentTypeError(
-            f"found {text!r}, expected NAME=N with NAME one of {', '.join(names)}"
+            f"found {text!r}, expected NAME=N, N at least 1, with NAME one of {', '.join(names)}"
         )
     return match[1], int(match[2])
 
@@ -31,6 +31,11 @@ def add_limits(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=N",
         help="what a file may ask for, such as max_cameras=2000; repeatable",
     )
+
+
+def limits_of(arguments: argparse.Namespace) -> Limits:
+    """The limits that ``--limit`` leaves or sets."""
+    return Limits(**dict(arguments.limit))
 
 
 def add_on_error(parser: argparse.ArgumentParser, default: str) -> None:

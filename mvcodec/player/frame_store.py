@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mvcodec.container import McapReader
+from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.decoder import Decoder
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet
@@ -57,14 +58,16 @@ class FrameStore:
     Args:
         path: an MCAP file, complete or cut off.
         cache_bytes: decoded frame sets are kept up to this size (and at least three of them).
+        limits: what is more than that is refused.
 
     Raises:
         InputError, StreamError: as `read_frame_table`.
     """
 
-    def __init__(self, path: Path, cache_bytes: int = CACHE_BYTES) -> None:
+    def __init__(self, path: Path, cache_bytes: int = CACHE_BYTES, limits: Limits = DEFAULT_LIMITS) -> None:
         self.path = path
-        table = read_frame_table(path)
+        self._limits = limits
+        table = read_frame_table(path, limits)
         self.table: FrameTable = replace(table, cut_off=table.cut_off and self._told(table.cut_off))
         self._cache = _Cache(cache_bytes)
         self._cursors: list[_Cursor] = []
@@ -128,7 +131,7 @@ class FrameStore:
         else:
             if len(self._cursors) == MAX_CURSORS:
                 self._cursors.pop(0).close()
-            cursor = _Cursor(self.path, keyframe)
+            cursor = _Cursor(self.path, keyframe, self._limits)
         self._cursors.append(cursor)
         return cursor
 
@@ -190,11 +193,11 @@ class _Cursor:
         next: the frame that `advance` returns.
     """
 
-    def __init__(self, path: Path, keyframe: int) -> None:
+    def __init__(self, path: Path, keyframe: int, limits: Limits) -> None:
         self.next = keyframe
-        self._reader = McapReader.open(path)
+        self._reader = McapReader.open(path, limits)
         self._packets = self._reader.packets(keyframe)
-        self._decoder = Decoder()
+        self._decoder = Decoder(limits=limits)
 
     def advance(self) -> DecodedSet:
         """Decode one frame set.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mvcodec.container import McapReader
+from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.errors import MvCodecWarning, StreamError
 from mvcodec.stream import HEADER_TRACK, StreamHeader
 
@@ -43,14 +44,14 @@ class FrameTable:
         return self.keyframes[place] if place < len(self.keyframes) else self.count
 
 
-def read_frame_table(path: Path) -> FrameTable:
+def read_frame_table(path: Path, limits: Limits = DEFAULT_LIMITS) -> FrameTable:
     """Read a file's index; where it has none (it was cut off), the whole file.
 
     Raises:
         InputError: the system refuses to open it.
         StreamError: not a file of ours, or no frame set in it.
     """
-    with McapReader.open(path) as reader:
+    with McapReader.open(path, limits) as reader:
         indexed = reader.frame_times()
         if indexed is None:
             return _scan(reader)

@@ -14,6 +14,7 @@ from typing import Any
 import cv2
 
 from mvcodec.array import Viewpoint
+from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.player.draft import QUICKER, SMALLER, Level, in_full_px, shrink
@@ -52,6 +53,7 @@ class PictureMaker:
         path: the file.
         make_synthesizer: makes one synthesizer.
         make_quick: makes one for pictures that move, if there is a quicker one.
+        limits: a file that needs more is refused.
 
     Attributes:
         store: the file's frame sets.
@@ -67,8 +69,9 @@ class PictureMaker:
         path: Path,
         make_synthesizer: Callable[[], Synthesizer],
         make_quick: Callable[[], Synthesizer] | None = None,
+        limits: Limits = DEFAULT_LIMITS,
     ) -> None:
-        self.store = FrameStore(path)
+        self.store = FrameStore(path, limits=limits)
         self.originals: Originals | None = None
         self.levels = SMALLER if make_quick is None else QUICKER
         self._synthesizers = SynthesizerPool(make_synthesizer, WORKERS + 1)
