@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import warnings
 from dataclasses import asdict
 from typing import Any
 
 from mvcodec.container import StreamInfo, read_info
+from mvcodec.errors import MvCodecWarning, StreamError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Print what the file holds."""
-    info = read_info(arguments.input)
+    info = read_info(arguments.input, _warn)
     if arguments.json:
         print(json.dumps(document(info)))
         return
@@ -33,8 +35,14 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"  calibration  {'given' if array.calibration.given else 'nominal (the input stated none)'}")
     if info.dropped is not None:
         print(f"  dropped      {count(info.dropped, 'frame set')}, left out while encoding live")
+    if info.damages:
+        print(f"  damage       in {count(info.damages, 'place')}; what is there is not counted above")
     for name, bits in asdict(info.bits).items():
         print(f"  {name:11}  {bits / 1000:.1f} kbit")
+
+
+def _warn(error: StreamError) -> None:
+    warnings.warn(str(error), MvCodecWarning, stacklevel=3)
 
 
 def document(info: StreamInfo) -> dict[str, Any]:
@@ -45,6 +53,7 @@ def document(info: StreamInfo) -> dict[str, Any]:
         "real": [list(position) for position in array.real],
         "frames": info.frames,
         "dropped": info.dropped,
+        "damages": info.damages,
         "fps": array.fps,
         "size": [array.width, array.height],
         "bits": asdict(info.bits),

@@ -8,11 +8,12 @@ import sys
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Any, NoReturn, TextIO
+from typing import Any, NoReturn
 
 import mvcodec
 from mvcodec.cli.arguments import join_negative_values
 from mvcodec.cli.standard_streams import ReaderGone, checked_streams
+from mvcodec.cli.warning_lines import WarningLines
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
 
 COMMANDS: dict[str, str] = {
@@ -58,9 +59,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
     arguments = sys.argv[1:] if argv is None else list(argv)
     try:
-        with checked_streams(), warnings.catch_warnings():
-            warnings.simplefilter("once", MvCodecWarning)
-            warnings.showwarning = _show_warning
+        with checked_streams(), warnings.catch_warnings(), WarningLines() as lines:
+            warnings.simplefilter("always", MvCodecWarning)
+            warnings.showwarning = lines.show
             return _run(arguments)
     except ReaderGone:
         return EXIT_FAILURE
@@ -103,22 +104,6 @@ def _module(command: str) -> Any:
 def _fail(error: object, code: int) -> int:
     print("mvcodec: error:", _one_line(error), file=sys.stderr)
     return code
-
-
-def _show_warning(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
-    text = f"mvcodec: warning: {_one_line(message)}"
-    if not issubclass(category, MvCodecWarning):
-        text = warnings.formatwarning(message, category, filename, lineno, line).rstrip()
-    from tqdm import tqdm
-
-    tqdm.write(text, file=file or sys.stderr)
 
 
 def _one_line(message: object) -> str:

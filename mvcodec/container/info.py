@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from mvcodec.container.chunks import OnDamage
 from mvcodec.container.reader import McapReader
+from mvcodec.errors import StreamError
 from mvcodec.stream import StreamHeader, TrackKind
 
 
@@ -32,30 +34,42 @@ class StreamInfo:
     """What `read_info` finds.
 
     Attributes:
-        frames: frame sets.
+        frames: frame sets, those that can be read.
         dropped: frame sets that a live encoder left out; None where the file says nothing of it.
+        damages: in how many places the file is damaged; what is there was not counted.
     """
 
     header: StreamHeader
     frames: int
     bits: Bits
     dropped: int | None = None
+    damages: int = 0
 
 
-def read_info(source: str | Path | BinaryIO) -> StreamInfo:
+def read_info(source: str | Path | BinaryIO, on_damage: OnDamage | None = None) -> StreamInfo:
     """Read a whole file without decoding its video.
+
+    Args:
+        on_damage: told of damage, behind which reading goes on; None raises it.
 
     Raises:
         InputError, StreamError: as `McapReader`.
     """
+    damages: list[StreamError] = []
+
+    def note(error: StreamError) -> None:
+        assert on_damage is not None
+        damages.append(error)
+        on_damage(error)
+
     sizes = dict.fromkeys(TrackKind, 0)
-    frames = 0
-    with McapReader.open(source) as reader:
+    frames, last = 0, -1
+    with McapReader.open(source, on_damage=None if on_damage is None else note) as reader:
         for number, packet in reader.packets():
             sizes[packet.track.kind] += 8 * len(packet.data)
-            frames = number + 1
+            frames, last = frames + (number != last), number
         dropped = reader.dropped
         total = 8 * reader.size
     texture, disparity = sizes[TrackKind.TEXTURE], sizes[TrackKind.DISPARITY]
     bits = Bits(total, texture, disparity, total - texture - disparity)
-    return StreamInfo(reader.header, frames, bits, dropped)
+    return StreamInfo(reader.header, frames, bits, dropped, len(damages))
