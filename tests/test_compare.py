@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from statistics import fmean
 
 import numpy as np
 import pytest
+from command_line import fails, succeeds
 from small_arrays import HEIGHT, WIDTH, picture, write_array
 
 from mvcodec.array import Position
 from mvcodec.capture import open_input
+from mvcodec.capture.pictures import read_picture
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
 from mvcodec.evaluation.compare import common_frame_count, compare
-from mvcodec.evaluation.metrics import psnr, ssim
+from mvcodec.evaluation.flicker import temporal_psnr
+from mvcodec.evaluation.immersive import iv_psnr
+from mvcodec.evaluation.metrics import psnr, ssim, ssim_picture
 from mvcodec.evaluation.quality import Comparison, QualityMeter
 from mvcodec.frames import Picture
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
@@ -83,14 +88,66 @@ def test_every_view_is_virtual_where_the_folder_lists_no_real_ones(original: Pat
 
 def test_json_has_the_documented_form(original: Path, tmp_path: Path) -> None:
     document = run(original, write_decoded(tmp_path, range(5), real=REAL)).to_json()
-    assert list(document) == ["psnr_y", "ssim", "views"]
-    assert list(document["psnr_y"]) == list(document["ssim"]) == ["all", "real", "virtual", "worst"]
+    metrics = ["psnr_y", "ssim", "temporal_psnr_y"]
+    assert list(document) == [*metrics, "views"]
+    for metric in metrics:
+        assert list(document[metric]) == ["all", "real", "virtual", "worst"]
     assert [(view["row"], view["col"], view["real"]) for view in document["views"]] == [
         (0, 0, True),
         (0, 1, False),
         (0, 2, True),
     ]
-    assert set(document["views"][0]) == {"row", "col", "real", "psnr_y", "ssim"}
+    assert list(document["views"][0]) == ["row", "col", "real", *metrics]
+
+
+def test_flicker_is_that_of_each_view_and_needs_two_frames(original: Path, tmp_path: Path) -> None:
+    decoded = write_decoded(tmp_path, range(5), real=REAL)
+    result = run(original, decoded, slice(1, 4))
+    expected = [
+        temporal_psnr(
+            [picture((0, col), frame) for frame in (1, 2, 3)],
+            [spoilt((0, col), frame) for frame in (1, 2, 3)],
+        )
+        for col in range(3)
+    ]
+    assert [view.temporal_psnr_y for view in result.views] == pytest.approx(expected)
+    assert result.summary("temporal_psnr_y").virtual == pytest.approx(expected[1])
+    single = run(original, decoded, slice(1, 2)).to_json()
+    assert "temporal_psnr_y" not in single
+    assert "temporal_psnr_y" not in single["views"][0]
+
+
+def test_options_add_iv_psnr_and_maps_of_the_first_frame(original: Path, tmp_path: Path) -> None:
+    decoded = write_decoded(tmp_path / "d", range(5), real=REAL)
+    options = (
+        "compare",
+        original,
+        decoded,
+        "--frames",
+        "3:5",
+        "--iv-psnr",
+        "--ssim-maps",
+        tmp_path / "m" / "n",
+    )
+    document = json.loads(succeeds(*options, "--json"))
+    pairs = [(picture((0, 2), frame), spoilt((0, 2), frame)) for frame in (3, 4)]
+    expected = fmean(iv_psnr(*pair) for pair in pairs)
+    assert document["views"][2]["iv_psnr"] == pytest.approx(expected)
+    assert document["iv_psnr"]["worst"] == pytest.approx(expected)
+    maps = sorted(path.name for path in (tmp_path / "m" / "n").iterdir())
+    assert maps == ["r00_c00.png", "r00_c01.png", "r00_c02.png"]
+    np.testing.assert_array_equal(read_picture(tmp_path / "m" / "n" / maps[2]), ssim_picture(*pairs[0]))
+    text = succeeds(*options).splitlines()
+    assert text[0].split() == ["view", "kind", "Y-PSNR", "dB", "SSIM", "temporal", "dB", "IV-PSNR", "dB"]
+    figures = [document[metric]["worst"] for metric in ("psnr_y", "ssim", "temporal_psnr_y", "iv_psnr")]
+    assert text[-1].split() == ["worst", "view", *map("{:.{}f}".format, figures, (2, 4, 2, 2))]
+    assert len({len(line) for line in text}) == 1, "columns stand below their titles"
+
+
+def test_maps_that_cannot_be_written_are_named(original: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    line = fails(1, "compare", original, original, "--ssim-maps", tmp_path / "file")
+    assert "file/r00_c0" in line
 
 
 def test_unequal_grids_are_refused(original: Path, tmp_path: Path) -> None:

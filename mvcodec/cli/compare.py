@@ -4,15 +4,28 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
+from mvcodec.array import Position
 from mvcodec.capture import open_input, resolve_frames
 from mvcodec.cli.arguments import add_frames, add_output_options
 from mvcodec.cli.progress import progress
 from mvcodec.evaluation.compare import common_frame_count, compare
 from mvcodec.evaluation.provenance import ProvenanceQuality
 from mvcodec.evaluation.quality import Comparison
+from mvcodec.frames import Picture
+from mvcodec.output.pictures import write_png
+from mvcodec.stream import view_name
+
+COLUMNS = {
+    "psnr_y": ("Y-PSNR dB", 9, 2),
+    "ssim": ("SSIM", 7, 4),
+    "temporal_psnr_y": ("temporal dB", 11, 2),
+    "iv_psnr": ("IV-PSNR dB", 10, 2),
+}
+"""Title, width and decimals of each metric."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,6 +41,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="where decode --provenance wrote, mostly DECODED: virtual views by how many cameras saw a pixel",
     )
+    parser.add_argument(
+        "--iv-psnr",
+        action="store_true",
+        help="IV-PSNR as well, which takes some 17 times as long as all others",
+    )
+    parser.add_argument(
+        "--ssim-maps",
+        type=Path,
+        metavar="DIR",
+        help="write each view's SSIM map of the first compared frame, as DIR/rRR_cCC.png: white is alike",
+    )
     add_output_options(parser, "print JSON")
 
 
@@ -38,30 +62,45 @@ def run(arguments: argparse.Namespace) -> None:
     total = len(resolve_frames(arguments.frames, count, decoded.name))
     with progress("compare", total, quiet=arguments.quiet) as bar:
         result = compare(
-            original, decoded, arguments.frames, provenance=arguments.provenance, on_frame=bar.update
+            original,
+            decoded,
+            arguments.frames,
+            provenance=arguments.provenance,
+            immersive=arguments.iv_psnr,
+            on_ssim_map=arguments.ssim_maps and partial(_write_map, arguments.ssim_maps),
+            on_frame=bar.update,
         )
     print(json.dumps(result.to_json()) if arguments.json else table(result))
 
 
 def table(result: Comparison) -> str:
     """The figures for people: every view, then the means, then those by provenance."""
-    lines = [f"{'view':10} {'kind':8} {'Y-PSNR dB':>9} {'SSIM':>7}"]
+    columns = [COLUMNS[metric] for metric in result.measured]
+    lines = [f"{'view':10} {'kind':8}" + "".join(f" {title:>{width}}" for title, width, _ in columns)]
     for view in result.views:
-        kind = "real" if view.real else "virtual"
-        name = f"({view.position[0]}, {view.position[1]})"
-        lines.append(f"{name:10} {kind:8} {view.psnr_y:9.2f} {view.ssim:7.4f}")
-    psnr, ssim = result.psnr_y.to_json(), result.ssim.to_json()
-    for kind, decibel in psnr.items():
-        similarity = ssim[kind]
-        figures = (
-            "no such view" if decibel is None or similarity is None else f"{decibel:9.2f} {similarity:7.4f}"
-        )
-        lines.append(
-            f"{'worst view' if kind == 'worst' else 'mean':10} {'' if kind == 'worst' else kind:8} {figures}"
-        )
+        name, kind = f"({view.position[0]}, {view.position[1]})", "real" if view.real else "virtual"
+        figures = [getattr(view, metric) for metric in result.measured]
+        lines.append(f"{name:10} {kind:8}{_cells(figures, columns)}")
+    summaries = [result.summary(metric).to_json() for metric in result.measured]
+    for kind in summaries[0]:
+        name = f"{'worst view':10} {'':8}" if kind == "worst" else f"{'mean':10} {kind:8}"
+        lines.append(name + _cells([summary[kind] for summary in summaries], columns))
     if result.by_provenance is not None:
         lines += ["", *_provenance_lines(result.by_provenance)]
     return "\n".join(lines)
+
+
+def _cells(figures: Sequence[float | None], columns: Sequence[tuple[str, int, int]]) -> str:
+    cells = [
+        f" {figure:{width}.{digits}f}"
+        for figure, (_, width, digits) in zip(figures, columns, strict=True)
+        if figure is not None
+    ]
+    return "".join(cells) or " no such view"
+
+
+def _write_map(folder: Path, view: Position, picture: Picture) -> None:
+    write_png(folder / f"{view_name(view)}.png", picture)
 
 
 def _provenance_lines(by_cameras: Mapping[int, ProvenanceQuality]) -> list[str]:

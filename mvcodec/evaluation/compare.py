@@ -5,16 +5,20 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from statistics import fmean
 
 from mvcodec.array import Position
 from mvcodec.capture import ArraySource, resolve_frames
 from mvcodec.errors import InputError, MvCodecWarning
+from mvcodec.evaluation.flicker import FlickerMeter
+from mvcodec.evaluation.immersive import iv_psnr
+from mvcodec.evaluation.metrics import ssim_picture
 from mvcodec.evaluation.provenance import ProvenanceMeter, read_seen_by
-from mvcodec.evaluation.quality import Comparison, QualityMeter
-from mvcodec.frames import FrameSet
+from mvcodec.evaluation.quality import Comparison, QualityMeter, ViewQuality
+from mvcodec.frames import FrameSet, Picture
 
 THREADS = 2
 
@@ -25,9 +29,11 @@ def compare(
     frames: slice | None = None,
     *,
     provenance: Path | None = None,
+    immersive: bool = False,
+    on_ssim_map: Callable[[Position, Picture], object] | None = None,
     on_frame: Callable[[], object] | None = None,
 ) -> Comparison:
-    """Measure every view of a decoded array.
+    """Measure every view of a decoded array: PSNR, SSIM and, of two frames or more, temporal PSNR.
 
     The decoded array says which of its views were coded; where it does not (an original), every
     view counts as virtual.
@@ -36,6 +42,8 @@ def compare(
         frames: a range of the frames that both hold (a slice of step 1); all of them if None.
         provenance: the folder where ``decode --provenance`` wrote (the decoded array's own one, as a
             rule); the virtual views are measured by how many cameras saw each pixel then.
+        immersive: IV-PSNR as well: 0.6 s for a picture of 960 x 640, where all others take 0.04 s.
+        on_ssim_map: called, from any thread, with each view of the first frame and its `ssim_picture`.
         on_frame: called after each frame that was measured.
 
     Raises:
@@ -48,10 +56,14 @@ def compare(
     positions = decoded.array.positions
     real = decoded.listed_real or ()
     meter, by_cameras = QualityMeter(real), ProvenanceMeter()
+    sequences = {view: _Sequence() for view in positions}
 
     def measure(ours: FrameSet, theirs: FrameSet, view: Position) -> None:
         pictures = ours.pictures[view], theirs.pictures[view]
         meter.push(view, *pictures)
+        if on_ssim_map is not None and sequences[view].flicker.frames == 0:
+            on_ssim_map(view, ssim_picture(*pictures))
+        sequences[view].push(*pictures, immersive)
         if provenance is not None and view not in real:
             number = theirs.index - decoded.first_frame
             by_cameras.push(*pictures, read_seen_by(provenance, view, number, decoded.array))
@@ -65,8 +77,28 @@ def compare(
             list(pool.map(partial(measure, ours, theirs), positions))
             if on_frame is not None:
                 on_frame()
-    result = meter.result()
-    return result if provenance is None else replace(result, by_provenance=by_cameras.result())
+    views = tuple(sequences[view.position].added_to(view) for view in meter.result().views)
+    return Comparison(views, None if provenance is None else by_cameras.result())
+
+
+@dataclass(slots=True)
+class _Sequence:
+    """What is measured of one view's pictures in the order of their frames."""
+
+    flicker: FlickerMeter = field(default_factory=FlickerMeter)
+    iv_psnrs: list[float] = field(default_factory=list)
+
+    def push(self, original: Picture, picture: Picture, immersive: bool) -> None:
+        self.flicker.push(original, picture)
+        if immersive:
+            self.iv_psnrs.append(iv_psnr(original, picture))
+
+    def added_to(self, view: ViewQuality) -> ViewQuality:
+        return replace(
+            view,
+            temporal_psnr_y=self.flicker.result() if self.flicker.frames > 1 else None,
+            iv_psnr=fmean(self.iv_psnrs) if self.iv_psnrs else None,
+        )
 
 
 def common_frame_count(original: ArraySource, decoded: ArraySource) -> int:

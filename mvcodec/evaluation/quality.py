@@ -13,6 +13,9 @@ from mvcodec.evaluation.metrics import psnr, ssim
 from mvcodec.evaluation.provenance import ProvenanceQuality
 from mvcodec.frames import Picture
 
+METRICS = ("psnr_y", "ssim", "temporal_psnr_y", "iv_psnr")
+"""Figures of views, by the names of `ViewQuality`; the first two are always there."""
+
 
 @dataclass(frozen=True, slots=True)
 class ViewQuality:
@@ -24,6 +27,8 @@ class ViewQuality:
         psnr_y: mean of the per-picture luma PSNR, dB.
         ssim: mean of the per-picture luma SSIM.
         pictures: how many were measured.
+        temporal_psnr_y: of the view's sequence, dB, see `FlickerMeter`; None where that was not measured.
+        iv_psnr: mean of the per-picture IV-PSNR, dB; None where that was not measured.
     """
 
     position: Position
@@ -31,6 +36,8 @@ class ViewQuality:
     psnr_y: float
     ssim: float
     pictures: int
+    temporal_psnr_y: float | None = None
+    iv_psnr: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,29 +75,38 @@ class Comparison:
     @property
     def psnr_y(self) -> Summary:
         """Luma PSNR, dB."""
-        return _summary((view, view.psnr_y) for view in self.views)
+        return self.summary("psnr_y")
 
     @property
     def ssim(self) -> Summary:
         """Luma SSIM."""
-        return _summary((view, view.ssim) for view in self.views)
+        return self.summary("ssim")
+
+    def summary(self, metric: str) -> Summary:
+        """Of one of METRICS; all None where it was not measured."""
+        found = [(view, getattr(view, metric)) for view in self.views]
+        return _summary((view, figure) for view, figure in found if figure is not None)
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Those of METRICS that every view has."""
+        return tuple(
+            metric for metric in METRICS if all(getattr(view, metric) is not None for view in self.views)
+        )
 
     def to_json(self) -> dict[str, Any]:
         """The form that ``mvcodec compare --json`` prints."""
-        document: dict[str, Any] = {
-            "psnr_y": self.psnr_y.to_json(),
-            "ssim": self.ssim.to_json(),
-            "views": [
-                {
-                    "row": view.position[0],
-                    "col": view.position[1],
-                    "real": view.real,
-                    "psnr_y": view.psnr_y,
-                    "ssim": view.ssim,
-                }
-                for view in self.views
-            ],
-        }
+        metrics = self.measured
+        document: dict[str, Any] = {metric: self.summary(metric).to_json() for metric in metrics}
+        document["views"] = [
+            {
+                "row": view.position[0],
+                "col": view.position[1],
+                "real": view.real,
+                **{metric: getattr(view, metric) for metric in metrics},
+            }
+            for view in self.views
+        ]
         if self.by_provenance is not None:
             document["by_provenance"] = {
                 str(cameras): quality.to_json() for cameras, quality in self.by_provenance.items()
