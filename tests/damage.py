@@ -17,9 +17,9 @@ COUNT = 20
 GOP = 5
 
 
-def small_file(count: int = COUNT) -> bytes:
+def small_file(count: int = COUNT, gop: int = GOP) -> bytes:
     """Frame sets of two small cameras; keyframes, and so chunks, every five."""
-    return encoded_file(ARRAY, count, gop=GOP, qp=30)
+    return encoded_file(ARRAY, count, gop=gop, qp=30)
 
 
 @dataclass
