@@ -6,8 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
+import av
 import numpy as np
 import pytest
+from av.video.frame import PictureType
+from numpy.typing import NDArray
 from small_arrays import write_array
 
 from mvcodec.capture import ArraySource, open_input
@@ -16,7 +19,7 @@ from mvcodec.errors import SettingError
 from mvcodec.evaluation.anchors import ANCHORS, SIMULCAST, Anchor, CodedArray, code_array
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.stream import TrackKind
-from mvcodec.video.codec import CodedPicture, Planes, RateControl, VideoSettings
+from mvcodec.video.codec import CodedPicture, Planes, RateControl, VideoEncoder, VideoSettings
 from mvcodec.video.colour import grey_planes
 from mvcodec.video.table import CODECS
 
@@ -142,6 +145,59 @@ def test_a_sequence_goes_through_the_matrix_to_and_fro_with_keyframes_at_ours(
     assert result.bits == 8 * 18
     assert result.quality.psnr_y.worst is not None
     assert result.quality.psnr_y.worst > 45
+
+
+class RecordingEncoder:
+    """Passes on to a real encoder, and keeps its access units."""
+
+    units: ClassVar[list[CodedPicture]] = []
+
+    def __init__(self, encoder: VideoEncoder) -> None:
+        self.encoder = encoder
+
+    def push(self, planes: Planes, keyframe: bool = False) -> list[CodedPicture]:
+        return self._kept(self.encoder.push(planes, keyframe))
+
+    def flush(self) -> list[CodedPicture]:
+        return self._kept(self.encoder.flush())
+
+    def _kept(self, units: list[CodedPicture]) -> list[CodedPicture]:
+        self.units.extend(units)
+        return units
+
+
+def decoded_lumas(codec: str, units: list[CodedPicture]) -> list[NDArray[np.uint8]]:
+    decoder = CODECS[codec].decoder(low_delay=False)
+    shown = [planes for unit in units for planes in decoder.push(unit.data, "unit")]
+    return [planes.y for planes in [*shown, *decoder.flush()]]
+
+
+def has_b_pictures(codec: str, units: list[CodedPicture]) -> bool:
+    context = av.CodecContext.create(codec, "r")
+    assert isinstance(context, av.VideoCodecContext)
+    frames = [frame for unit in units for frame in context.decode(av.Packet(unit.data))]
+    return any(frame.pict_type == PictureType.B for frame in [*frames, *context.decode(None)])
+
+
+@pytest.mark.parametrize("codec", list(CODECS))
+def test_real_streams_start_anew_at_our_keyframe_times(
+    source: ArraySource, monkeypatch: pytest.MonkeyPatch, codec: str
+) -> None:
+    real = CODECS[codec]
+    recording = replace(real, encoder=lambda settings: RecordingEncoder(real.encoder(settings)))
+    RecordingEncoder.units.clear()
+    with monkeypatch.context() as patch:
+        patch.setitem(CODECS, codec, recording)
+        rate = RateControl(qp=27)
+        code_array(source, anchor=ANCHORS["pvs"][0], codec=codec, rate=rate, gop=2, preset="medium")
+    units = RecordingEncoder.units
+    assert codec == "av1" or has_b_pictures(codec, units), "AV1 has none by name"
+    keys = [number for number, unit in enumerate(units) if unit.keyframe]
+    assert len(keys) == 2
+    whole = decoded_lumas(codec, units)
+    parts = [decoded_lumas(codec, part) for part in (units[: keys[1]], units[keys[1] :])]
+    assert [len(part) for part in parts] == [12, 12], "6 views at 2 times"
+    np.testing.assert_array_equal(np.stack(whole), np.stack(parts[0] + parts[1]))
 
 
 def coded(source: ArraySource, anchor: Anchor, codec: str = "h264", threads: int = 2) -> CodedArray:
