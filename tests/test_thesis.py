@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from small_arrays import picture, write_array
+from small_arrays import photograph, picture, write_array
 
 from mvcodec.errors import InputError
-from mvcodec.evaluation.regions import BadPixels
 from mvcodec.evaluation.thesis import grid, maps, pairs
-from mvcodec.evaluation.thesis.figures import ThesisTables, ViewFigures
-from mvcodec.evaluation.thesis.orderings import find_orderings
+from mvcodec.evaluation.thesis.figures import LayerFigures, ThesisTables, ViewFigures
+from mvcodec.evaluation.thesis.lines import BETAS, Line
 from mvcodec.frames import DisparityMap, Picture
+from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.stereo.fixed_window import FixedWindow
 
 ROOT = Path(__file__).parents[1]
@@ -47,6 +44,26 @@ def test_figures_of_a_picture_and_their_mean() -> None:
     assert ViewFigures.mean([same, dark]).psnr == pytest.approx((100 + dark.psnr) / 2)
 
 
+def test_the_error_in_holes_is_counted_apart() -> None:
+    grey = np.full((16, 16, 3), 20, np.uint8)
+    spoilt, holes = grey.copy(), np.zeros((16, 16), np.bool_)
+    spoilt[:4], holes[:4] = 0, True
+    spoilt[8] = 40
+    measured = ViewFigures.measure(grey, spoilt, holes)
+    assert measured.hole_share == 0.25
+    assert measured.hole_error_share == pytest.approx(4 / 5)
+    assert ViewFigures.measure(grey, grey, holes).hole_error_share == 0
+
+
+def test_layers_of_a_map() -> None:
+    values = np.repeat(np.array([[2, 3, 4, 9]], np.float32), 20, axis=0).repeat([5, 5, 5, 5], axis=1)
+    disparity = DisparityMap(values, np.ones(values.shape, np.bool_))
+    runs, levels = (LayerFigures.measure(disparity, split) for split in ("runs", "levels"))
+    assert runs == LayerFigures(2, 3, 0.75, 0.5)
+    assert levels == LayerFigures(4, 1, 0.25, 0.0)
+    assert LayerFigures.measure(disparity, "runs", 1000) == LayerFigures(0, 0, 0.0, 0.0)
+
+
 def test_tables_of_the_thesis_are_looked_up_and_missed_by_name(tmp_path: Path) -> None:
     path = tmp_path / "tables.json"
     with pytest.raises(InputError, match=r"tables\.json: found No such file"):
@@ -73,7 +90,13 @@ def test_views_between_two_ends(tmp_path: Path) -> None:
     best = table.mean("Tsukuba", "DILS, SAD, a layer a level")
     assert best.ssim > 0.9
     assert best.ssim > table.mean("Tsukuba", "LI, SAD").ssim
-    assert set(table.deepest_px) == {(s, m) for s in pairs.WINDOWS for m in ("SAD", "AD-Census")}
+    assert set(table.layers) == {
+        (name, kind, split)
+        for name in pairs.WINDOWS
+        for kind in ("SAD", "AD-Census")
+        for split in ("runs", "levels")
+    }
+    assert all(figures.count > 0 for figures in table.layers.values())
 
 
 def test_sets_without_a_hint_or_a_folder_are_named(tmp_path: Path) -> None:
@@ -84,20 +107,90 @@ def test_sets_without_a_hint_or_a_folder_are_named(tmp_path: Path) -> None:
         pairs.measure_pairs(tmp_path, NoTables())
 
 
-def test_views_within_a_cell(tmp_path: Path) -> None:
-    write_array(tmp_path / "shop_17x17", 6, 5, frames=1, disparity_per_step_px=(0.0, 4.0))
-    table = grid.measure_grid(tmp_path, NoTables(), ["1-to-5"])
-    places = {(row.level, row.route) for row in table.rows if row.method == "DILS"}
-    assert places == {(1, ""), (2, ""), (3, "ul"), (3, "lr")}
+@pytest.fixture(scope="module")
+def tall_grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a grid of every row of the thesis's narrow cells: a near patch before a wall."""
+    folder = tmp_path_factory.mktemp("grid")
+    wall, patch = photograph("coffee"), photograph("chelsea")[100:124, 150:180]
+    facts = ArrayFacts(13, 5, fps=10.0, disparity_per_step_px=(0.0, 4.0))
+    with ArrayFolderWriter(folder / "shop_17x17", facts) as writer:
+        views = {}
+        for row, col in np.ndindex(13, 5):
+            seen = wall[100 + row : 164 + row, 150 + col : 246 + col].copy()
+            top, left = 38 - 3 * row, 40 - 3 * col
+            seen[top : top + 24, left : left + 30] = patch
+            views[row, col] = seen
+        writer.push(views)
+    return folder
+
+
+def test_views_within_a_cell(tall_grid: Path) -> None:
+    done: list[int] = []
+    table = grid.measure_grid(tall_grid, NoTables(), ["1-to-5"], lambda: done.append(1))
+    assert len(done) == grid.steps(["1-to-5"])
+    places = {(row.level, row.line, row.route) for row in table.rows if row.method == "DILS"}
+    assert places == {
+        (1, "row 1", ""),
+        (2, "column 1", ""),
+        *((3, line, route) for line in ("row 7", "row 11") for route in ("ul", "lr")),
+    }
     assert {row.method for row in table.rows} == {method.name for method in grid.METHODS}
-    assert {row.beta for row in table.rows} == set(grid.BETAS)
+    assert {row.beta for row in table.rows} == set(BETAS)
+    assert set(table.layers) == {("1-to-5", "runs"), ("1-to-5", "levels")}
     filled, holes = (table.mean(f"DILS, a layer a level{rest}") for rest in ("", ", holes left"))
     assert filled.ssim > holes.ssim
     assert filled.ssim > 0.85
+    assert holes.hole_share == pytest.approx(filled.hole_share, abs=0.05)
     by_level = [table.mean("DILS", levels=[level]).ssim for level in grid.LEVELS]
-    assert np.mean(by_level) == pytest.approx(table.mean("DILS").ssim, abs=0.05)
-    with pytest.raises(InputError, match="6x5 views, expected at least 9x9"):
-        grid.measure_grid(tmp_path, NoTables(), ["1-to-9"])
+    # Level 3 has two rows and two routes, the others one row or column.
+    assert np.average(by_level, weights=(1, 1, 4)) == pytest.approx(table.mean("DILS").ssim)
+    with pytest.raises(InputError, match="13x5 views, expected at least 9x9"):
+        grid.measure_grid(tall_grid, NoTables(), ["1-to-9"])
+
+
+def test_the_thesis_stands_beside_the_same_method_route_and_place_only(tall_grid: Path) -> None:
+    table = grid.measure_grid(tall_grid, NoTables(), ["1-to-5"])
+    with_ssim = {(r.method, r.line, r.route) for r in table.rows if r.thesis_ssim is not None}
+    assert with_ssim == {
+        ("DILS", "row 1", ""),
+        ("DILS, holes left", "row 1", ""),
+        ("DILS", "column 1", ""),
+        ("DILS", "row 7", "lr"),
+        ("DILS", "row 11", "lr"),
+    }
+    with_psnr = {(r.method, r.line, r.route) for r in table.rows if r.thesis_psnr is not None}
+    assert with_psnr == {("DILS", "row 1", ""), ("DILS", "column 1", "")}
+
+
+@pytest.mark.parametrize(
+    ("line", "top", "place"),
+    [
+        (Line("1-to-5", 1, 1), 0, (0, 1)),
+        (Line("1-to-5", 2, 1), 0, (1, 0)),
+        (Line("1-to-5", 3, 7), 4, (2, 1)),
+        (Line("1-to-5", 3, 11), 8, (2, 1)),
+        (Line("1-to-9", 1, 9), 0, (8, 2)),
+        (Line("1-to-9", 3, 7), 0, (6, 2)),
+        (Line("1-to-9", 3, 11), 8, (2, 2)),
+        (Line("1-to-17", 3, 9), 0, (8, 4)),
+    ],
+    ids=str,
+)
+def test_lines_are_counted_as_the_thesis_does(line: Line, top: int, place: tuple[int, int]) -> None:
+    assert line.top == top
+    assert line.place(0.25) == place
+
+
+def test_items_of_the_thesis_belong_to_their_views(tmp_path: Path) -> None:
+    path = tmp_path / "tables.json"
+    path.write_text('{"a": {"row7": [0.1, 0.2, 0.3]}}')
+    tables = ThesisTables(path)
+    short, long = (Line(span, 3, 7, "a", "row7") for span in ("1-to-5", "1-to-9"))
+    assert [short.thesis(tables, "row7", beta) for beta in BETAS] == [0.1, 0.2, 0.3]
+    # Columns 3, 7 and 9, the last one a camera.
+    assert [long.thesis(tables, "row7", beta) for beta in BETAS] == [0.1, None, 0.2]
+    assert short.thesis(tables, None, 0.25) is None
+    assert Line("1-to-17", 3, 9).thesis(tables, "row7", 0.25) is None
 
 
 def test_each_pair_is_matched_once() -> None:
@@ -122,96 +215,6 @@ def test_each_pair_is_matched_once() -> None:
     assert counting.calls == 3
 
 
-def figures(similarity: float) -> ViewFigures:
-    return ViewFigures(30.0, 25.0, similarity)
-
-
-def made_up_tables() -> tuple[pairs.PairTable, maps.MapTable, grid.GridTable]:
-    """Tables in which every ordering of the thesis appears."""
-    by_method = {"LI, SAD": 0.4, "LI, SAD, holes filled": 0.5, "DILS, SAD": 0.6, "DILS, AD-Census": 0.7}
-    by_method |= {"DILS, SAD, a layer a level": 0.8, "DILS, AD-Census, a layer a level": 0.9}
-    pair_rows = [
-        pairs.PairRow(name, method, 0.5, figures(ssim), None, None)
-        for name in pairs.WINDOWS
-        for method, ssim in by_method.items()
-    ]
-    depths = {(name, kind): 7 for name in pairs.WINDOWS for kind in ("SAD", "AD-Census")}
-    shares = {"FW-SAD": 0.2, "SAD-DLR": 0.1, "SSD+MF": 0.2, "ADCensus": 0.05, "SGBM": 0.07}
-    map_rows = [
-        maps.MapRow(method, pair.name, (BadPixels(share, share, share),) * 3, None)
-        for pair in maps.PAIRS
-        for method, share in shares.items()
-    ]
-    grid_rows = [
-        grid.GridRow(
-            span, level, route, method.name, beta, figures(0.9 - 0.1 * i - 0.05 * (level == 3)), None
-        )
-        for i, span in enumerate(grid.SPANS)
-        for method in grid.METHODS
-        for level in method.levels
-        for route in (("ul", "lr") if level == 3 else ("",))
-        for beta in grid.BETAS
-    ]
-    lowered = [
-        replace(row, figures=figures(row.figures.ssim - 0.3))
-        if row.method == "LI" or row.method.endswith("holes left")
-        else row
-        for row in grid_rows
-    ]
-    return (
-        pairs.PairTable(tuple(pair_rows), depths),
-        maps.MapTable(tuple(map_rows)),
-        grid.GridTable(tuple(lowered)),
-    )
-
-
-def test_orderings_that_appear_need_no_reason() -> None:
-    orderings = find_orderings(*made_up_tables())
-    assert all(ordering.holds for ordering in orderings)
-    assert not any(ordering.why for ordering in orderings)
-    text = " ".join(ordering.statement for ordering in orderings)
-    for said in ("DILS above LI", "AD-Census above SAD", "filling above holes", "short above long baseline"):
-        assert said in text
-    assert "levels 1 and 2 above level 3" in text
-
-
-def test_orderings_that_do_not_appear_say_so_and_why() -> None:
-    pair_table, map_table, grid_table = made_up_tables()
-    worse = [
-        replace(row, figures=figures(0.3)) if (row.set_name, row.method) == ("Cones", "DILS, SAD") else row
-        for row in pair_table.rows
-    ]
-    raised = [
-        replace(row, figures=figures(0.99)) if row.method == "DILS, holes left" else row
-        for row in grid_table.rows
-    ]
-    worst = [
-        replace(row, rates=(BadPixels(0.19, 0.19, 0.19),) * 3) if row.method == "SAD-DLR" else row
-        for row in map_table.rows
-    ]
-    orderings = find_orderings(
-        replace(pair_table, rows=tuple(worse)), maps.MapTable(tuple(worst)), grid.GridTable(tuple(raised))
-    )
-    missing = {(ordering.statement, ordering.where): ordering for ordering in orderings if not ordering.holds}
-    assert "7 disparities" in missing["DILS above LI", "Cones"].why
-    assert ("filling above holes, DILS", "1-to-5") in missing
-    assert any(statement.startswith("DLR cuts") for statement, _ in missing)
-    assert ("DILS above LI", "Tsukuba") not in missing
-    assert all(ordering.why for ordering in missing.values())
-
-
-def test_the_tool_names_what_is_missing(tmp_path: Path) -> None:
-    command = [sys.executable, "tools/reproduce_thesis.py", "--data", str(tmp_path)]
-    tables = tmp_path / "none.json"
-    ended = subprocess.run(
-        [*command, "--tables", str(tables)], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert ended.returncode == 1
-    assert ended.stderr.startswith("reproduce_thesis: ")
-    assert ended.stderr.count("\n") == 1
-    assert "none.json" in ended.stderr
-
-
 @pytest.mark.shared_data
 @pytest.mark.skipif(not DATA.is_dir(), reason="../shared/data is absent")
 def test_table_5_2_is_near_the_thesis() -> None:
@@ -223,16 +226,8 @@ def test_table_5_2_is_near_the_thesis() -> None:
         assert 100 * raw[pair].non_occluded == pytest.approx(printed[first], abs=3)
         assert 100 * raw[pair].all == pytest.approx(printed[first + 1], abs=3)
         assert 100 * raw[pair].discontinuity == pytest.approx(printed[first + 2], abs=5)
-    assert table.average_percent("ADCensus") < table.average_percent("SAD-DLR")
-    assert table.average_percent("SAD-DLR") < 0.75 * table.average_percent("FW-SAD")
-
-
-@pytest.mark.slow
-@pytest.mark.shared_data
-@pytest.mark.skipif(not DATA.is_dir(), reason="../shared/data is absent")
-def test_the_tool_prints_every_table() -> None:
-    command = [sys.executable, "tools/reproduce_thesis.py", "--data", str(DATA), "--tables", str(TABLES)]
-    ended = subprocess.run([*command, "--json"], cwd=ROOT, capture_output=True, text=True, check=True)
-    document = json.loads(ended.stdout)
-    assert {"tables_4_2_to_4_5", "table_5_2", "tables_6_5_to_6_10", "orderings"} <= set(document)
-    assert all(ordering["holds"] or ordering["why"] for ordering in document["orderings"])
+    assert table.average_percent("ADCensus") < table.average_percent(maps.OUR_DLR)
+    assert table.average_percent(maps.OUR_DLR) < 0.75 * table.average_percent("FW-SAD")
+    # Why the thesis's own steps leave FW-SAD's map as it is: there is but one layer.
+    assert all(figures.largest_share > 0.95 for figures in table.layers.values())
+    assert table.average_percent(maps.THESIS_DLR) == pytest.approx(table.average_percent("FW-SAD"), abs=0.5)

@@ -1,24 +1,27 @@
 """Tables 6.5 - 6.10: views within a cell of cameras by MLVS, on a grid of 17 x 17 views like Lego's.
 
-The thesis's cells are 5 x 5 and 9 x 9 views wide (1-to-5 and 1-to-9 matching); 17 x 17 is ours. Of each, the
-views at a quarter, half and three quarters are scored: at level 1 in the top and bottom row, at level 2
-in the left and right column, at level 3 in the middle row, by both routes.
+The thesis's cells are 5 x 5 and 9 x 9 views wide (1-to-5 and 1-to-9 matching); 17 x 17 is ours. Scored are
+the rows and columns that the thesis prints, in the first cell that they cross, at a quarter, half and three
+quarters of the way between its cameras. Level 3 goes by both routes; the thesis's goes from left to right.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from pathlib import Path
 from threading import Lock
+from typing import Self
 
-from mvcodec.array import CameraArray, Position, Viewpoint
-from mvcodec.capture import open_input
+from mvcodec.array import Position, Viewpoint
+from mvcodec.capture import ArraySource, open_input
 from mvcodec.errors import InputError
-from mvcodec.evaluation.thesis.figures import ThesisTables, ViewFigures
-from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture
+from mvcodec.evaluation.thesis.figures import LayerFigures, Step, ThesisTables, ViewFigures, no_step
+from mvcodec.evaluation.thesis.lines import BETAS, LINES, SPANS, Line
+from mvcodec.frames import DecodedSet, DisparityMap, Picture
+from mvcodec.layers.table import LAYER_SPLITS
 from mvcodec.stereo.fixed_window import FixedWindow
 from mvcodec.stereo.matcher import PairMatcher
 from mvcodec.stereo.pairwise import Pairwise
@@ -28,11 +31,8 @@ from mvcodec.synthesis.mlvs import Route
 from mvcodec.synthesis.synthesizer import Synthesizer
 
 FOLDER = "shop_17x17"
-SPANS = {"1-to-5": 4, "1-to-9": 8, "1-to-17": 16}
-"""Grid steps between the cameras of a cell, by the thesis's name."""
-
-BETAS = (0.25, 0.5, 0.75)
 LEVELS = (1, 2, 3)
+THESIS_METHOD, THESIS_METHOD_WITH_HOLES, THESIS_ROUTE = "DILS", "DILS, holes left", Route.LEFT_RIGHT
 THREADS = 2
 
 
@@ -76,40 +76,54 @@ METHODS = (
 
 @dataclass(frozen=True, slots=True)
 class GridRow:
-    """One method at one place of a cell.
+    """One method at one place of a line.
 
     Attributes:
         span: a name of SPANS.
         level: of MLVS.
+        line: the row or column.
         route: ``ul`` or ``lr`` at level 3; else empty.
         method: a name of METHODS.
-        beta: place between the cameras.
-        figures: mean over the two rows (level 1) or columns (level 2).
-        thesis_ssim: what the thesis has for Lego, or None.
+        beta: place between the cameras, along the line.
+        figures: ours.
+        thesis_psnr, thesis_ssim: what the thesis has for the same place of Lego, by the same method and
+            route, or None. Its PSNR is psnr_saturated.
     """
 
     span: str
     level: int
+    line: str
     route: str
     method: str
     beta: float
     figures: ViewFigures
+    thesis_psnr: float | None
     thesis_ssim: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class GridTable:
-    """Tables 6.5 - 6.10."""
+    """Tables 6.5 - 6.10.
+
+    Attributes:
+        rows: by span, line, route, method and beta.
+        layers: by (span, name of the split), of the left map of the upper left cell's upper pair.
+    """
 
     rows: tuple[GridRow, ...]
+    layers: Mapping[tuple[str, str], LayerFigures]
 
     def mean(
-        self, method: str, spans: Iterable[str] = tuple(SPANS), levels: Iterable[int] = LEVELS
+        self,
+        method: str,
+        spans: Iterable[str] = tuple(SPANS),
+        levels: Iterable[int] = LEVELS,
+        route: str | None = None,
     ) -> ViewFigures:
-        """Mean over the rows of a method."""
+        """Mean over the rows of a method; over both routes where none is given."""
         spans, levels = tuple(spans), tuple(levels)
         chosen = [r for r in self.rows if r.method == method and r.span in spans and r.level in levels]
-        return ViewFigures.mean([row.figures for row in chosen])
+        return ViewFigures.mean([row.figures for row in chosen if route in (None, row.route)])
 
 
 @dataclass(slots=True)
@@ -137,8 +151,10 @@ class RememberingMatcher:
         return found
 
 
-def measure_grid(data: Path, thesis: ThesisTables, spans: Sequence[str] = tuple(SPANS)) -> GridTable:
-    """Render and compare the scored views of the upper left cell, for every span.
+def measure_grid(
+    data: Path, thesis: ThesisTables, spans: Sequence[str] = tuple(SPANS), step: Step = no_step
+) -> GridTable:
+    """Render and compare the scored views of every span.
 
     Args:
         data: folder with the set.
@@ -148,85 +164,96 @@ def measure_grid(data: Path, thesis: ThesisTables, spans: Sequence[str] = tuple(
         InputError: the set is missing, smaller, or has no disparity hint.
     """
     source = open_input([data / FOLDER])
-    widest = max(SPANS[span] for span in spans) + 1
-    if min(source.array.rows, source.array.cols) < widest:
-        found = f"{source.array.rows}x{source.array.cols} views"
-        raise InputError(source.name, found, f"at least {widest}x{widest}")
     rows: list[GridRow] = []
+    layers: dict[tuple[str, str], LayerFigures] = {}
     for span in spans:
-        cell = _cell(source.array, SPANS[span])
-        (frames,) = source.frame_sets(slice(0, 1), sorted(set(cell.real) | set(_places(cell))))
-        rows += _measure_cell(span, cell, frames, thesis)
-    return GridTable(tuple(rows))
+        for top in sorted({line.top for line in LINES if line.span == span}):
+            lines = [line for line in LINES if (line.span, line.top) == (span, top)]
+            cell = _Cell.read(source, span, top, lines)
+            rows += _measure_cell(cell, lines, thesis, step)
+            if top == 0:
+                left_map = cell.left_map()
+                layers |= {(span, split): LayerFigures.measure(left_map, split) for split in LAYER_SPLITS}
+    return GridTable(tuple(rows), layers)
 
 
-def _cell(array: CameraArray, span: int) -> CameraArray:
-    """The upper left cell as an array of its own."""
-    return replace(array, rows=span + 1, cols=span + 1, real_rows=(0, span), real_cols=(0, span))
+def steps(spans: Sequence[str] = tuple(SPANS)) -> int:
+    """How often `measure_grid` calls its step."""
+    lines = [line for line in LINES if line.span in spans]
+    return sum(len(line.routes) for line in lines for method in METHODS if line.level in method.levels)
 
 
-def _places(cell: CameraArray) -> list[Position]:
-    return [place for level in LEVELS for beta in BETAS for place in _scored(cell, level, beta)]
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cell:
+    """Four cameras at the left edge of the grid as an array of their own, and what is scored between them."""
+
+    decoded: DecodedSet
+    originals: Mapping[Position, Picture]
+    matcher: RememberingMatcher
+
+    @classmethod
+    def read(cls, source: ArraySource, span: str, top: int, lines: Sequence[Line]) -> Self:
+        side = SPANS[span]
+        if source.array.rows <= top + side or source.array.cols <= side:
+            found = f"{source.array.rows}x{source.array.cols} views"
+            raise InputError(source.name, found, f"at least {top + side + 1}x{side + 1}")
+        ends = (0, side)
+        array = replace(source.array, rows=side + 1, cols=side + 1, real_rows=ends, real_cols=ends)
+        range_px = array.disparity_hint_px
+        if range_px is None:
+            raise InputError(source.name, "no disparity_per_step_px", "one, as the search range")
+        places = sorted({*array.real, *(line.place(beta) for line in lines for beta in BETAS)})
+        (frames,) = source.frame_sets(slice(0, 1), [(top + row, col) for row, col in places])
+        originals = {(row, col): frames.pictures[top + row, col] for row, col in places}
+        pictures = {camera: originals[camera] for camera in array.real}
+        matcher = RememberingMatcher(FixedWindow())
+        maps = Pairwise(matcher).match(array, pictures, range_px)
+        decoded = DecodedSet(array, frames.index, frames.time_ns, pictures, maps, range_px)
+        return cls(decoded, originals, matcher)
+
+    def left_map(self) -> DisparityMap:
+        """Of the upper pair."""
+        array, pictures = self.decoded.array, self.decoded.pictures
+        pair = pictures[0, 0], pictures[0, array.cols - 1]
+        return self.matcher.match_pair(*pair, self.decoded.disparity_range_px)[0]
 
 
-def _scored(cell: CameraArray, level: int, beta: float) -> list[Position]:
-    last = cell.rows - 1
-    between = round(beta * last)
-    if level == 1:
-        return [(0, between), (last, between)]
-    return [(between, 0), (between, last)] if level == 2 else [(last // 2, between)]
-
-
-def _measure_cell(span: str, cell: CameraArray, frames: FrameSet, thesis: ThesisTables) -> list[GridRow]:
-    range_px = cell.disparity_hint_px
-    if range_px is None:
-        raise InputError(FOLDER, "no disparity_per_step_px", "one, as the search range")
-    matcher = RememberingMatcher(FixedWindow())
-    pictures = {camera: frames.pictures[camera] for camera in cell.real}
-    maps = Pairwise(matcher).match(cell, pictures, range_px)
-    decoded = DecodedSet(cell, frames.index, frames.time_ns, pictures, maps, range_px)
+def _measure_cell(cell: _Cell, lines: Sequence[Line], thesis: ThesisTables, step: Step) -> list[GridRow]:
     jobs = [
-        (method, level, route)
+        (line, method, route)
+        for line in lines
+        for route in line.routes
         for method in METHODS
-        for level in method.levels
-        for route in (Route if level == 3 else (Route.UPPER_LOWER,))
+        if line.level in method.levels
     ]
 
-    def measure(job: tuple[Method, int, Route]) -> list[GridRow]:
-        method, level, route = job
-        synthesizer = method.synthesizer(matcher, route)
+    def measure(job: tuple[Line, Method, Route | None]) -> list[GridRow]:
+        line, method, route = job
+        synthesizer = method.synthesizer(cell.matcher, route or Route.UPPER_LOWER)
         rows = []
         for beta in BETAS:
-            figures = [
-                ViewFigures.measure(
-                    frames.pictures[place], synthesizer.render(decoded, Viewpoint(*place)).pixels
-                )
-                for place in _scored(cell, level, beta)
-            ]
-            shown = route.value if level == 3 else ""
-            printed = _thesis_ssim(thesis, span, level, method.name, beta)
-            rows.append(GridRow(span, level, shown, method.name, beta, ViewFigures.mean(figures), printed))
+            place = line.place(beta)
+            view = synthesizer.render(cell.decoded, Viewpoint(*place))
+            figures = ViewFigures.measure(cell.originals[place], view.pixels, view.seen_by == 0)
+            printed = [line.thesis(thesis, entry, beta) for entry in _entries(line, method, route)]
+            shown = route.value if route else ""
+            rows.append(
+                GridRow(line.span, line.level, line.name, shown, method.name, beta, figures, *printed)
+            )
         return rows
 
+    found = []
     with ThreadPoolExecutor(THREADS) as pool:
-        return [row for rows in pool.map(measure, jobs) for row in rows]
+        for rows in pool.map(measure, jobs):
+            found += rows
+            step()
+    return found
 
 
-_THESIS_ENTRIES = {
-    ("1-to-5", 1, "DILS"): ("table_6_5_lego_level1_1to5", "row1_ssim"),
-    ("1-to-5", 1, "DILS, holes left"): ("table_6_5_lego_level1_1to5", "row1_ssim_without_filling"),
-    ("1-to-5", 2, "DILS"): ("table_6_6_lego_level2_1to5", "col1_ssim"),
-    ("1-to-5", 3, "DILS"): ("table_6_7_lego_level3_1to5", "row7_ssim"),
-    ("1-to-9", 1, "DILS"): ("table_6_8_lego_1to9_level1_ssim", "row1"),
-    ("1-to-9", 2, "DILS"): ("table_6_9_lego_1to9_level2_ssim", "col1"),
-    ("1-to-9", 3, "DILS"): ("table_6_10_lego_1to9_level3_ssim", "row7"),
-}
-_THESIS_BETAS = {"1-to-5": (0.25, 0.5, 0.75), "1-to-9": (0.25, 0.75)}
-"""Of the entries' items; the third item of 1-to-9 is of column 9, a camera."""
-
-
-def _thesis_ssim(thesis: ThesisTables, span: str, level: int, method: str, beta: float) -> float | None:
-    entry = _THESIS_ENTRIES.get((span, level, method))
-    if entry is None or beta not in _THESIS_BETAS[span]:
-        return None
-    return float(thesis.at(*entry, _THESIS_BETAS[span].index(beta)))
+def _entries(line: Line, method: Method, route: Route | None) -> tuple[str | None, str | None]:
+    """The thesis's entries of PSNR and SSIM for a method: of what it did itself only."""
+    if route not in (None, THESIS_ROUTE):
+        return None, None
+    if method.name == THESIS_METHOD_WITH_HOLES:
+        return None, line.ssim_with_holes
+    return (line.psnr, line.ssim) if method.name == THESIS_METHOD else (None, None)

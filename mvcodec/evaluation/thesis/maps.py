@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean
@@ -12,9 +12,10 @@ import numpy as np
 from mvcodec.capture import ArraySource, open_input
 from mvcodec.errors import InputError
 from mvcodec.evaluation.regions import BadPixels, bad_pixels, regions
-from mvcodec.evaluation.thesis.figures import ThesisTables
-from mvcodec.frames import DisparityMap, FloatMap, Picture
-from mvcodec.layers.dlr import refine
+from mvcodec.evaluation.thesis.figures import LayerFigures, Step, ThesisTables, no_step
+from mvcodec.frames import DisparityMap, Picture
+from mvcodec.layers import dlr, dlr_thesis
+from mvcodec.layers.dlr_thesis import ThesisDlrSettings
 from mvcodec.stereo.adcensus import AdCensus
 from mvcodec.stereo.consistency import median
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
@@ -48,34 +49,56 @@ PAIRS = (
     Pair("Cones", "cones", (0, 2), 21),
 )
 
-Find = Callable[[Picture, Picture, tuple[float, float], int], FloatMap]
-"""(left, right, range in px, window) -> the left map, float32 (H, W) px."""
+Find = Callable[[Picture, Picture, tuple[float, float], int], DisparityMap]
+"""(left, right, range in px, window) -> the left map; valid where a value is the pixel's own, not filled."""
 
 
 def fixed_window(measure: str) -> Find:
     """One direction, no check, and an 11 x 11 median: the thesis's FW-SAD."""
 
-    def find(left: Picture, right: Picture, range_px: tuple[float, float], window: int) -> FloatMap:
+    def find(left: Picture, right: Picture, range_px: tuple[float, float], window: int) -> DisparityMap:
         (values, _), _ = FixedWindow(FixedWindowSettings(measure, window)).raw_pair(left, right, range_px)
-        return median(values, _MEDIAN_SIZE, range_px)
+        return DisparityMap(median(values, _MEDIAN_SIZE, range_px), np.ones(values.shape, np.bool_))
 
     return find
 
 
-def sad_dlr(left: Picture, right: Picture, range_px: tuple[float, float], window: int) -> FloatMap:
-    """FW-SAD, refined by layers."""
-    values = fixed_window("sad")(left, right, range_px, window)
-    return refine(left, DisparityMap(values, np.ones(values.shape, np.bool_))).values_px
+def thesis_dlr(split: str) -> Find:
+    """FW-SAD, refined by the thesis's steps, with layers of this split."""
 
+    def find(left: Picture, right: Picture, range_px: tuple[float, float], window: int) -> DisparityMap:
+        raw = fixed_window("sad")(left, right, range_px, window)
+        return dlr_thesis.refine(left, raw, settings=ThesisDlrSettings(split))
+
+    return find
+
+
+def our_dlr(left: Picture, right: Picture, range_px: tuple[float, float], window: int) -> DisparityMap:
+    """FW-SAD, refined by our DLR."""
+    return dlr.refine(left, fixed_window("sad")(left, right, range_px, window))
+
+
+RAW = "FW-SAD"
+THESIS_DLR = "DLR, the thesis's steps"
+THESIS_DLR_LEVELS = "DLR, the thesis's steps, a layer a level"
+OUR_DLR = "DLR, ours"
 
 METHODS: dict[str, Find] = {
-    "FW-SAD": fixed_window("sad"),
-    "SAD-DLR": sad_dlr,
+    RAW: fixed_window("sad"),
+    THESIS_DLR: thesis_dlr("runs"),
+    THESIS_DLR_LEVELS: thesis_dlr("levels"),
+    OUR_DLR: our_dlr,
     "SSD+MF": fixed_window("ssd"),
-    "ADCensus": lambda left, right, range_px, _: AdCensus().match_pair(left, right, range_px)[0].values_px,
-    "SGBM": lambda left, right, range_px, _: Sgbm().match_pair(left, right, range_px)[0].values_px,
+    "ADCensus": lambda left, right, range_px, _: AdCensus().match_pair(left, right, range_px)[0],
+    "SGBM": lambda left, right, range_px, _: Sgbm().match_pair(left, right, range_px)[0],
 }
-"""The thesis's rows, and SGBM, the codec's."""
+"""The thesis's rows, and what it has no counterpart for: a layer a level, our DLR, and SGBM, the codec's."""
+
+THESIS_ROWS = {RAW: "FW-SAD", THESIS_DLR: "SAD-DLR", "SSD+MF": "SSD+MF", "ADCensus": "ADCensus"}
+"""The thesis's names of its rows."""
+
+STEPS = len(PAIRS) * len(METHODS)
+"""How often `measure_maps` calls its step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +108,14 @@ class MapRow:
     Attributes:
         method, pair: which.
         rates: by threshold of THRESHOLDS_PX.
+        own_share: of the pixels (0..1) whose value is their own, not filled in.
         thesis_percent: (non-occluded, all, discontinuity) at 1 px, or None where it has no such row.
     """
 
     method: str
     pair: str
     rates: tuple[BadPixels, ...]
+    own_share: float
     thesis_percent: tuple[float, float, float] | None
 
     @property
@@ -101,9 +126,15 @@ class MapRow:
 
 @dataclass(frozen=True, slots=True)
 class MapTable:
-    """Table 5.2."""
+    """Table 5.2.
+
+    Attributes:
+        rows: by pair and method.
+        layers: by pair, the thesis's split of FW-SAD's map.
+    """
 
     rows: tuple[MapRow, ...]
+    layers: Mapping[str, LayerFigures]
 
     def of(self, method: str) -> tuple[MapRow, ...]:
         """The rows of a method, by pair."""
@@ -117,7 +148,7 @@ class MapTable:
         )
 
 
-def measure_maps(data: Path, thesis: ThesisTables) -> MapTable:
+def measure_maps(data: Path, thesis: ThesisTables, step: Step = no_step) -> MapTable:
     """Match the four pairs by every method and score the left maps.
 
     Args:
@@ -127,8 +158,8 @@ def measure_maps(data: Path, thesis: ThesisTables) -> MapTable:
         InputError: a set is missing, or has no truth or disparity hint.
     """
     columns = list(thesis.at("table_5_2_bad1_percent", "columns"))
-    printed = thesis.at("table_5_2_bad1_percent")
     rows = []
+    layers = {}
     for pair in PAIRS:
         source = open_input([data / pair.folder])
         truth, range_px = _truth(source, pair, 0), _range(source, pair)
@@ -140,10 +171,16 @@ def measure_maps(data: Path, thesis: ThesisTables) -> MapTable:
         first = columns.index(f"{pair.name} nonocc")
         for method, find in METHODS.items():
             found = find(left, right, range_px, pair.window)
-            rates = tuple(bad_pixels(scored, found, threshold) for threshold in THRESHOLDS_PX)
-            theirs = tuple(printed[method][first : first + 3]) if method in printed else None
-            rows.append(MapRow(method, pair.name, rates, theirs))
-    return MapTable(tuple(rows))
+            rates = tuple(bad_pixels(scored, found.values_px, threshold) for threshold in THRESHOLDS_PX)
+            theirs = None
+            if method in THESIS_ROWS:
+                printed = thesis.at("table_5_2_bad1_percent", THESIS_ROWS[method])
+                theirs = tuple(printed[first : first + 3])
+            rows.append(MapRow(method, pair.name, rates, float(found.valid.mean()), theirs))
+            if method == RAW:
+                layers[pair.name] = LayerFigures.measure(found, "runs")
+            step()
+    return MapTable(tuple(rows), layers)
 
 
 def _truth(source: ArraySource, pair: Pair, end: int) -> DisparityMap | None:

@@ -3,140 +3,132 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from statistics import fmean
 
-from mvcodec.evaluation.thesis.grid import SPANS, GridTable
-from mvcodec.evaluation.thesis.maps import PAIRS, MapTable
+from mvcodec.evaluation.thesis import reasons
+from mvcodec.evaluation.thesis.figures import ViewFigures
+from mvcodec.evaluation.thesis.grid import GridTable
+from mvcodec.evaluation.thesis.lines import SPANS
+from mvcodec.evaluation.thesis.maps import OUR_DLR, PAIRS, RAW, THESIS_DLR, MapTable
 from mvcodec.evaluation.thesis.pairs import WINDOWS, PairTable
+from mvcodec.evaluation.thesis.reasons import Ordering
 
 LEAST_DLR_CUT = 0.3
 ALIKE_SSIM = 0.03
-UNEXPLAINED = "nothing that was measured here explains it"
 _LEVELWISE = ", a layer a level"
 
 
-@dataclass(frozen=True, slots=True)
-class Ordering:
-    """One statement and what was found.
-
-    Attributes:
-        statement: what the thesis has.
-        where: set, span or mean that it was looked for in.
-        figures: what was compared.
-        holds: whether it appears.
-        why: where it does not appear, what keeps it from appearing.
-    """
-
-    statement: str
-    where: str
-    figures: str
-    holds: bool
-    why: str = ""
-
-
-def find_orderings(pairs: PairTable, maps: MapTable, grid: GridTable) -> tuple[Ordering, ...]:
-    """Every ordering of the thesis, by SSIM (pictures) or share of bad pixels (maps)."""
-    return (*_of_pairs(pairs), *_of_maps(maps), *_of_grid(grid))
+def find_orderings(
+    pairs: PairTable | None = None, maps: MapTable | None = None, grid: GridTable | None = None
+) -> tuple[Ordering, ...]:
+    """Every ordering of the thesis, by SSIM (pictures) or share of bad pixels (maps), of the tables given."""
+    return (
+        *(_of_pairs(pairs) if pairs else ()),
+        *(_of_maps(maps) if maps else ()),
+        *(_of_grid(grid) if grid else ()),
+    )
 
 
 def _of_pairs(table: PairTable) -> Iterator[Ordering]:
-    for set_name in WINDOWS:
-
-        def ssim(method: str, set_name: str = set_name) -> float:
-            return table.mean(set_name, method).ssim
-
-        for splits in ("", _LEVELWISE):
-            dils, census = ssim("DILS, SAD" + splits), ssim("DILS, AD-Census" + splits)
-            depth = table.deepest_px[set_name, "SAD"]
-            finer = ssim("DILS, SAD" + _LEVELWISE)
-            yield _above(
-                f"DILS{splits} above LI",
-                set_name,
-                dils,
-                ssim("LI, SAD"),
-                f"runs of the histogram merge: the deepest layer holds {depth} disparities, and one shift"
-                f" serves them all; a layer a level has {finer:.3f}",
-            )
-            deepest = table.deepest_px[set_name, "AD-Census"]
-            finer = ssim("DILS, AD-Census" + _LEVELWISE)
-            yield _above(
-                f"AD-Census above SAD in DILS{splits}",
-                set_name,
-                census,
-                dils,
-                f"a better map makes longer runs: layers of up to {deepest} disparities (SAD: {depth}) hide"
-                f" its gain; a layer a level has {finer:.3f}",
-            )
+    for name in WINDOWS:
+        line, sad, census = (
+            table.mean(name, method) for method in ("LI, SAD", "DILS, SAD", "DILS, AD-Census")
+        )
+        fine_sad, fine_census = (
+            table.mean(name, method + _LEVELWISE) for method in ("DILS, SAD", "DILS, AD-Census")
+        )
+        layers = {key[1:]: figures for key, figures in table.layers.items() if key[0] == name}
+        yield _above(
+            "DILS above LI",
+            name,
+            sad,
+            line,
+            reasons.deep_layers(layers["SAD", "runs"], layers["SAD", "levels"], (fine_sad, line)),
+        )
+        yield _above(
+            "AD-Census above SAD in DILS",
+            name,
+            census,
+            sad,
+            reasons.deep_layers(
+                layers["AD-Census", "runs"], layers["AD-Census", "levels"], (fine_census, fine_sad)
+            ),
+        )
+        yield _above(f"DILS{_LEVELWISE} above LI", name, fine_sad, line)
+        yield _above(f"AD-Census above SAD in DILS{_LEVELWISE}", name, fine_census, fine_sad)
 
 
 def _of_maps(table: MapTable) -> Iterator[Ordering]:
-    raw, refined = table.of("FW-SAD"), table.of("SAD-DLR")
-    cuts = [1 - after.bad1.all / before.bad1.all for before, after in zip(raw, refined, strict=True)]
-    texts = ", ".join(f"{pair.name} {cut:.0%}" for pair, cut in zip(PAIRS, cuts, strict=True))
-    yield Ordering(
-        f"DLR cuts FW-SAD's bad pixels by {LEAST_DLR_CUT:.0%}",
-        "all pixels, mean of the pairs",
-        f"{fmean(cuts):.1%} ({texts})",
-        holds := fmean(cuts) >= LEAST_DLR_CUT,
-        "" if holds else UNEXPLAINED,
-    )
-    for better, worse in pairwise(("ADCensus", "SAD-DLR", "FW-SAD")):
-        first, second = table.average_percent(better), table.average_percent(worse)
+    for method in (THESIS_DLR, OUR_DLR):
+        raw, refined = table.of(RAW), table.of(method)
+        cuts = [1 - after.bad1.all / before.bad1.all for before, after in zip(raw, refined, strict=True)]
+        texts = ", ".join(f"{pair.name} {cut:.0%}" for pair, cut in zip(PAIRS, cuts, strict=True))
+        holds = fmean(cuts) >= LEAST_DLR_CUT
         yield Ordering(
-            f"{better} below {worse}",
-            "average of table 5.2",
-            f"{first:.2f}, {second:.2f} %",
-            first < second,
-            "" if first < second else UNEXPLAINED,
+            f"{method}: cuts FW-SAD's bad pixels by {LEAST_DLR_CUT:.0%}",
+            "all pixels, mean of the pairs",
+            f"{fmean(cuts):.1%} ({texts})",
+            holds,
+            "" if holds else reasons.refinement(table, method),
         )
+        for better, worse in ((method, RAW), ("ADCensus", method)):
+            first, second = table.average_percent(better), table.average_percent(worse)
+            below = round(first, 1) < round(second, 1)  # the thesis's table has one decimal
+            yield Ordering(
+                f"{better} below {worse}",
+                "average of table 5.2",
+                f"{first:.2f}, {second:.2f} %",
+                below,
+                "" if below else reasons.refinement(table, method),
+            )
 
 
 def _of_grid(table: GridTable) -> Iterator[Ordering]:
     for splits in ("", _LEVELWISE):
         dils = "DILS" + splits
         for span in SPANS:
-
-            def ssim(method: str, *levels: int, span: str = span) -> float:
-                return table.mean(method, [span], levels or (1, 2, 3)).ssim
-
-            finer = ssim("DILS" + _LEVELWISE, 1, 2)
-            yield _above(
-                f"{dils} above LI",
-                f"{span}, levels 1 and 2",
-                ssim(dils, 1, 2),
-                ssim("LI", 1, 2),
-                f"runs of the histogram merge into deep layers, and one shift serves each; a layer a level"
-                f" has {finer:.3f}",
-            )
-            yield _above(f"filling above holes, {dils}", span, ssim(dils), ssim(f"{dils}, holes left"))
-            low = min(ssim(dils, 1), ssim(dils, 2))
-            yield _above(f"levels 1 and 2 above level 3, {dils}", span, low, ssim(dils, 3))
-            routes = [
-                fmean(
-                    r.figures.ssim for r in table.rows if (r.method, r.span, r.route) == (dils, span, route)
-                )
-                for route in ("ul", "lr")
-            ]
-            yield Ordering(
-                f"routes UL and LR alike, {dils}",
-                f"{span}, level 3",
-                f"{routes[0]:.3f}, {routes[1]:.3f}",
-                alike := abs(routes[0] - routes[1]) <= ALIKE_SSIM,
-                "" if alike else UNEXPLAINED,
-            )
+            yield from _of_span(table, dils, span)
         for short, long in pairwise(SPANS):
             yield _above(
                 f"short above long baseline, {dils}",
                 f"{short}, {long}",
-                table.mean(dils, [short]).ssim,
-                table.mean(dils, [long]).ssim,
+                table.mean(dils, [short]),
+                table.mean(dils, [long]),
             )
 
 
-def _above(statement: str, where: str, first: float, second: float, why: str = UNEXPLAINED) -> Ordering:
-    holds = first > second
-    return Ordering(
-        statement, where, f"{first:.3f} {'>' if holds else '<='} {second:.3f}", holds, "" if holds else why
+def _of_span(table: GridTable, dils: str, span: str) -> Iterator[Ordering]:
+    line, ours, finer = (table.mean(name, [span], (1, 2)) for name in ("LI", dils, "DILS" + _LEVELWISE))
+    deep = reasons.deep_layers(table.layers[span, "runs"], table.layers[span, "levels"], (finer, line))
+    where = f"{span}, levels 1 and 2"
+    yield _above(f"{dils} above LI", where, ours, line, deep if dils == "DILS" else "")
+    filled, holes = table.mean(dils, [span]), table.mean(f"{dils}, holes left", [span])
+    yield _above(f"filling above holes, {dils}", span, filled, holes)
+    lower = min((table.mean(dils, [span], [level]) for level in (1, 2)), key=lambda figures: figures.ssim)
+    yield _above(f"levels 1 and 2 above level 3, {dils}", span, lower, table.mean(dils, [span], [3]))
+    routes = [table.mean(dils, [span], [3], route) for route in ("ul", "lr")]
+    alike = abs(routes[0].ssim - routes[1].ssim) <= ALIKE_SSIM
+    yield Ordering(
+        f"routes UL and LR alike, {dils}",
+        f"{span}, level 3",
+        f"{routes[0].ssim:.3f}, {routes[1].ssim:.3f}",
+        alike,
+        "" if alike else reasons.other_measures(*routes),
     )
+
+
+def _above(
+    statement: str, where: str, first: ViewFigures, second: ViewFigures, special: str = ""
+) -> Ordering:
+    """`first` has the higher SSIM; where not, `special` says why, and what else was measured."""
+    holds = first.ssim > second.ssim
+    figures = f"{first.ssim:.3f} {'>' if holds else '<='} {second.ssim:.3f}"
+    if holds:
+        return Ordering(statement, where, figures, holds)
+    told = (
+        [special, reasons.other_measures(first, second)]
+        if special
+        else [reasons.other_measures(first, second)]
+    )
+    return Ordering(statement, where, figures, holds, "; ".join(told))

@@ -11,8 +11,8 @@ import numpy as np
 from mvcodec.array import Position, Viewpoint
 from mvcodec.capture import ArraySource, open_input
 from mvcodec.errors import InputError
-from mvcodec.evaluation.thesis.figures import ThesisTables, ViewFigures
-from mvcodec.frames import DecodedSet, DisparityMap
+from mvcodec.evaluation.thesis.figures import LayerFigures, Step, ThesisTables, ViewFigures, no_step
+from mvcodec.frames import DecodedSet, DisparityMap, FrameSet
 from mvcodec.layers.table import LAYER_SPLITS
 from mvcodec.stereo.adcensus import AdCensus
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
@@ -77,11 +77,11 @@ class PairTable:
 
     Attributes:
         rows: by set, method and beta.
-        deepest_px: by (set, map name), how many disparities the deepest layer of the thesis's split holds.
+        layers: by (set, map name, name of the split), of the left map.
     """
 
     rows: tuple[PairRow, ...]
-    deepest_px: Mapping[tuple[str, str], int]
+    layers: Mapping[tuple[str, str, str], LayerFigures]
 
     def mean(self, set_name: str, method: str) -> ViewFigures:
         """Mean over the betas."""
@@ -90,7 +90,11 @@ class PairTable:
         )
 
 
-def measure_pairs(data: Path, thesis: ThesisTables) -> PairTable:
+STEPS = len(WINDOWS) * len(METHODS)
+"""How often `measure_pairs` calls its step."""
+
+
+def measure_pairs(data: Path, thesis: ThesisTables, step: Step = no_step) -> PairTable:
     """Synthesise and compare every view between the ends of Tsukuba and Cones.
 
     Args:
@@ -100,8 +104,7 @@ def measure_pairs(data: Path, thesis: ThesisTables) -> PairTable:
         InputError: a set is missing, or has no disparity hint.
     """
     rows: list[PairRow] = []
-    deepest: dict[tuple[str, str], int] = {}
-    betas = list(thesis.at("table_4_2_4_3", "beta"))
+    layers: dict[tuple[str, str, str], LayerFigures] = {}
     for set_name, window in WINDOWS.items():
         source = open_input([data / set_name.lower()])
         (frames,) = source.frame_sets(slice(0, 1), source.array.positions)
@@ -110,19 +113,30 @@ def measure_pairs(data: Path, thesis: ThesisTables) -> PairTable:
             "AD-Census": _decoded(source, AdCensus(), dense=True),
         }
         for map_name, decoded_set in decoded.items():
-            layers = LAYER_SPLITS["runs"](decoded_set.disparities[0, 0], DilsSettings().threshold)
-            deepest[set_name, map_name] = max(last - first + 1 for first, last in layers.bounds_px)
+            for split in LAYER_SPLITS:
+                figures = LayerFigures.measure(decoded_set.disparities[0, 0], split, DilsSettings().threshold)
+                layers[set_name, map_name, split] = figures
         for method in METHODS:
-            for col in range(1, source.array.cols - 1):
-                beta = col / (source.array.cols - 1)
-                view = method.synthesizer().render(decoded[method.map_name], Viewpoint(0, col))
-                figures = ViewFigures.measure(frames.pictures[0, col], view.pixels)
-                printed: list[float | None] = [None, None]
-                if method.thesis is not None:
-                    place = ("table_4_2_4_3", method.thesis)
-                    printed = [thesis.at(*place, f, set_name, betas.index(beta)) for f in ("psnr", "ssim")]
-                rows.append(PairRow(set_name, method.name, beta, figures, *printed))
-    return PairTable(tuple(rows), deepest)
+            rows += _measure_method(set_name, method, frames, decoded[method.map_name], thesis)
+            step()
+    return PairTable(tuple(rows), layers)
+
+
+def _measure_method(
+    set_name: str, method: Method, frames: FrameSet, decoded: DecodedSet, thesis: ThesisTables
+) -> list[PairRow]:
+    betas = list(thesis.at("table_4_2_4_3", "beta"))
+    last = decoded.array.cols - 1
+    rows = []
+    for col in range(1, last):
+        view = method.synthesizer().render(decoded, Viewpoint(0, col))
+        figures = ViewFigures.measure(frames.pictures[0, col], view.pixels, view.seen_by == 0)
+        printed: list[float | None] = [None, None]
+        if method.thesis is not None:
+            place = ("table_4_2_4_3", method.thesis)
+            printed = [thesis.at(*place, f, set_name, betas.index(col / last)) for f in ("psnr", "ssim")]
+        rows.append(PairRow(set_name, method.name, col / last, figures, *printed))
+    return rows
 
 
 def _decoded(source: ArraySource, matcher: PairMatcher, *, dense: bool) -> DecodedSet:
