@@ -3,8 +3,8 @@
     python benchmarks/memory.py [--short 200] [--long 2000] [--cache-mib 16]
 
 Each run is a process of its own; the figure is the most resident memory that it ever had. Playing is measured
-with a cache of 16 MiB, which the short run fills: the player's own of 256 MiB is full after 218 of these frame
-sets only, so it wants --short 400 --cache-mib 256.
+with a cache of 16 MiB, which the short run fills: the player's own of 256 MiB is full only after 218 of these
+frame sets, so it wants --short 400 --cache-mib 256.
 """
 
 from __future__ import annotations

@@ -59,14 +59,14 @@ def _message_index_flip() -> bytes:
     return _flip(content, chunk_ends(content)[1] + 9 + 2 + 4 + 1)
 
 
-def _rewritten(change: Callable[[str, bytes, int], tuple[bytes, int] | None]) -> bytes:
-    """The file once more, each message changed (data, log time) or left out."""
+def rewritten(content: bytes, change: Callable[[str, bytes, int], tuple[bytes, int] | None]) -> bytes:
+    """A file once more, each message changed (data, log time) or left out."""
     target = io.BytesIO()
     writer = Writer(target, chunk_size=4000, use_summary_offsets=False)
     writer.start()
     schemas: dict[str, int] = {}
     channels: dict[str, int] = {}
-    reader = make_reader(io.BytesIO(written(coded_sets())))
+    reader = make_reader(io.BytesIO(content))
     for schema, channel, message in reader.iter_messages(log_time_order=False):
         assert schema is not None
         changed = change(channel.topic, message.data, message.log_time)
@@ -79,8 +79,8 @@ def _rewritten(change: Callable[[str, bytes, int], tuple[bytes, int] | None]) ->
         if changed is not None:
             data, log_time = changed
             writer.add_message(channels[channel.topic], log_time, data, log_time, message.sequence)
-    header = next(reader.iter_metadata())
-    writer.add_metadata(header.name, header.metadata)
+    for header in reader.iter_metadata():
+        writer.add_metadata(header.name, header.metadata)
     writer.finish()  # type: ignore[no-untyped-call]
     return target.getvalue()
 
@@ -95,7 +95,7 @@ def _in_video(change: Callable[[CompressedVideo], None], time_ns: int) -> bytes:
             data = video.SerializeToString()
         return data, log_time
 
-    return _rewritten(changed)
+    return rewritten(written(coded_sets()), changed)
 
 
 def _without_sets(data: bytes) -> bytes:
@@ -220,12 +220,17 @@ BROKEN_STREAMS: Broken = {
     "frame_id": (lambda: _in_video(_drop_frame_id, 500_000_000), "frame-id"),
     "format": (lambda: _in_video(_other_format, 500_000_000), "format"),
     "stamp": (lambda: _in_video(_stamp, 500_000_000), "time"),
-    "no_transforms": (lambda: _rewritten(lambda t, d, n: None if t == "/tf" else (d, n)), "topic"),
+    "no_transforms": (
+        lambda: rewritten(written(coded_sets()), lambda t, d, n: None if t == "/tf" else (d, n)),
+        "topic",
+    ),
     "calibration": (
-        lambda: _rewritten(lambda t, d, n: (d[:-2] if t.endswith("calibration") else d, n)),
+        lambda: rewritten(
+            written(coded_sets()), lambda t, d, n: (d[:-2] if t.endswith("calibration") else d, n)
+        ),
         "schema",
     ),
-    "times_go_back": (lambda: _rewritten(lambda _, d, n: (d, 2 * 10**9 - n)), "order"),
+    "times_go_back": (lambda: rewritten(written(coded_sets()), lambda _, d, n: (d, 2 * 10**9 - n)), "order"),
 }
 
 BROKEN = BROKEN_CONTAINERS | BROKEN_STREAMS

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from broken_files import Sets, coded_sets, written
+from broken_files import Sets, coded_sets, rewritten, written
 from coding import config, encode, frame_set, make_array
 from command_line import fails, mvcodec
 from damage import chunk_ends, outcome
@@ -173,3 +173,54 @@ def test_the_command_says_how_many_are_incomplete(tmp_path: Path) -> None:
     assert "found no complete frame set that can be decoded" in line
     with pytest.raises(SettingError, match="incomplete: found some, expected keep or drop"):
         recover(source, target, lambda _: None, incomplete="some")  # type: ignore[arg-type]
+
+
+def test_validate_misses_depth_where_it_is_lost(depth_file: bytes, tmp_path: Path) -> None:
+    def without(wanted: Wanted) -> list[tuple[str, str | None, int | None]]:
+        path = tmp_path / "x.mcap"
+        sets: Sets = []
+        with McapReader(io.BytesIO(depth_file), depth=True) as reader:
+            for _, packet in reader.packets():
+                if packet.index == len(sets):
+                    sets.append([])
+                if packet.track.kind is not TrackKind.DEPTH or wanted(packet):
+                    sets[-1].append(packet)
+        path.write_bytes(written(sets))
+        return [(found.code, found.topic, found.time_ns) for found in validate(path)]
+
+    assert without(lambda _: True) == []
+    assert without(lambda _: False) == [], "depth is optional"
+    topic = "/camera/r00_c01/depth"
+    assert without(lambda packet: (packet.index, packet.track.topic) != (11, topic)) == [
+        ("incomplete", topic, 1_100_000_000)
+    ]
+    assert without(lambda packet: packet.index > 0 or packet.track.topic != topic) == [
+        ("incomplete", topic, 100_000_000)
+    ]
+
+
+def test_validate_finds_depth_that_is_not_as_specified(depth_file: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    changes: list[tuple[dict[str, object], str]] = [
+        ({"encoding": "mono16"}, "depth"),
+        ({"step": 95}, "depth"),
+        ({"frame_id": "elsewhere"}, "frame-id"),
+    ]
+    for fields, code in changes:
+        path.write_bytes(_with_depth(depth_file, fields))
+        (found,) = validate(path)
+        assert (found.code, found.topic, found.time_ns) == (code, "/camera/r00_c00/depth", 500_000_000)
+
+
+def _with_depth(content: bytes, fields: dict[str, object]) -> bytes:
+    """The file with other fields in one depth message."""
+
+    def changed(topic: str, data: bytes, time_ns: int) -> tuple[bytes, int]:
+        if (topic, time_ns) == ("/camera/r00_c00/depth", 500_000_000):
+            image = RawImage.FromString(data)
+            for name, value in fields.items():
+                setattr(image, name, value)
+            data = image.SerializeToString()
+        return data, time_ns
+
+    return rewritten(content, changed)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from broken_files import rewritten
 from coding import config, frame_set, make_array
 from command_line import fails, mvcodec, succeeds
 from damage import chunk_ends, small_file
@@ -59,24 +60,19 @@ def points(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 def _changed(content: bytes, message_type: Any, change: Change) -> bytes:
     """The file once more, each message of a type changed (message, log time) or left out."""
-    target = io.BytesIO()
-    writer = Writer(target, use_summary_offsets=False)
-    writer.start()
-    channels: dict[str, int] = {}
-    for schema, channel, message in make_reader(io.BytesIO(content)).iter_messages(log_time_order=False):
-        assert schema is not None
-        if channel.topic not in channels:
-            number = writer.register_schema(schema.name, schema.encoding, schema.data)
-            channels[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, number)
-        data, time_ns = message.data, message.log_time
-        if schema.name == message_type.DESCRIPTOR.full_name:
-            new = change(channel.topic, message_type.FromString(data), time_ns)
-            if new is None:
-                continue
-            data, time_ns = new[0].SerializeToString(), new[1]
-        writer.add_message(channels[channel.topic], time_ns, data, time_ns, message.sequence)
-    writer.finish()  # type: ignore[no-untyped-call]
-    return target.getvalue()
+    names = {
+        channel.topic: schema.name
+        for schema, channel, _ in make_reader(io.BytesIO(content)).iter_messages()
+        if schema is not None
+    }
+
+    def changed(topic: str, data: bytes, time_ns: int) -> tuple[bytes, int] | None:
+        if names[topic] != message_type.DESCRIPTOR.full_name:
+            return data, time_ns
+        new = change(topic, message_type.FromString(data), time_ns)
+        return None if new is None else (new[0].SerializeToString(), new[1])
+
+    return rewritten(content, changed)
 
 
 def _examined(

@@ -9,6 +9,7 @@ from typing import Any
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
 from mcap.records import Message
 from mcap.well_known import MessageEncoding
@@ -16,12 +17,16 @@ from mcap.well_known import MessageEncoding
 from mvcodec.container import schemas
 from mvcodec.container.file_check import CheckedMessage
 from mvcodec.container.finding import Finding, error, warning
-from mvcodec.stream import HEADER_TRACK, StreamHeader
+from mvcodec.errors import StreamError
+from mvcodec.stream import HEADER_TRACK, StreamHeader, Track, TrackKind
 
 _KINDS: dict[str, Any] = {
     "video": CompressedVideo,
     "calibration": CameraCalibration,
     "transform": FrameTransform,
+}
+_SCHEMA_NAMES = {kind: name for kind, (name, _) in schemas.PROTOBUF_SCHEMAS.items()} | {
+    "depth": schemas.DEPTH_SCHEMA[0]
 }
 
 
@@ -49,8 +54,14 @@ class MessageCheck:
             assert track.camera is not None
             self._kinds[track.topic] = "video"
             self._frames[track.topic] = schemas.frame_id(track.camera)
+        self._unseen = {HEADER_TRACK.topic, *self._kinds}
+        self._size = header.array.width, header.array.height
+        for camera in header.array.real:
+            topic = Track(TrackKind.DEPTH, camera).topic
+            self._kinds[topic], self._frames[topic] = "depth", schemas.frame_id(camera)
         self.topics = {HEADER_TRACK.topic, *self._kinds}
-        self._unseen = set(self.topics)
+        self._depths: set[str] | None = None  # topics with depth, which each frame set must have
+        self._depths_now: set[str] = set()
         self._due: dict[tuple[str, bytes], int] | None = None
         self._key: Message | None = None
 
@@ -64,6 +75,17 @@ class MessageCheck:
             for number, message in enumerate(rig)
         }
 
+    def end_set(self, time_ns: int) -> None:
+        """The frame set at hand is over: it must have depth on the topics of the first one."""
+        if self._depths is None:
+            self._depths = self._depths_now
+        for topic in sorted(self._depths - self._depths_now):
+            self._add(error("incomplete", "no depth in this frame set", topic, time_ns))
+        for topic in sorted(self._depths_now - self._depths):
+            self._add(error("incomplete", "depth begins here, expected in each frame set", topic, time_ns))
+        self._depths = self._depths | self._depths_now
+        self._depths_now = set()
+
     def push(self, message: CheckedMessage) -> bytes | None:
         """Check a message on one of the topics; returns the access unit of a video message."""
         self._unseen.discard(message.topic)
@@ -73,13 +95,16 @@ class MessageCheck:
                 self._add(error("schema", f"message encoding {message.encoding!r}, expected json", *where))
             return None
         kind = self._kinds[message.topic]
-        name = schemas.PROTOBUF_SCHEMAS[kind][0]
+        name = _SCHEMA_NAMES[kind]
         if (message.schema, message.encoding) != (name, MessageEncoding.Protobuf):
             found = f"{message.schema!r} as {message.encoding!r}"
             self._add(error("schema", f"{found}, expected {name} as protobuf", *where))
             return None
         if kind == "video":
             return self._video(message)
+        if kind == "depth":
+            self._depth(message)
+            return None
         try:
             key = (message.topic, _KINDS[kind].FromString(message.record.data).SerializeToString())
         except DecodeError as failure:
@@ -113,10 +138,25 @@ class MessageCheck:
             return None
         if parsed.format != self._format:
             self._add(error("format", f"format {parsed.format!r}, expected {self._format!r}", *where))
-        frame = self._frames[message.topic]
-        if parsed.frame_id != frame:
-            self._add(error("frame-id", f"frame_id {parsed.frame_id!r}, expected {frame!r}", *where))
-        if parsed.timestamp.seconds * 1_000_000_000 + parsed.timestamp.nanos != record.log_time:
-            self._add(warning("time", "its timestamp is not its log_time", *where))
+        self._check_stamps(parsed, *where)
         data: bytes = parsed.data
         return data
+
+    def _depth(self, message: CheckedMessage) -> None:
+        topic, time_ns = message.topic, message.record.log_time
+        self._depths_now.add(topic)
+        try:
+            schemas.depth_data(message.record.data, topic, *self._size)
+        except StreamError as failure:
+            text = f"{failure.found}, expected {failure.expected}"
+            self._add(error("depth", text, topic, time_ns))
+        else:
+            self._check_stamps(RawImage.FromString(message.record.data), topic, time_ns)
+
+    def _check_stamps(self, parsed: Any, topic: str, time_ns: int) -> None:
+        """Frame and time of a picture, as the message itself has them."""
+        frame = self._frames[topic]
+        if parsed.frame_id != frame:
+            self._add(error("frame-id", f"frame_id {parsed.frame_id!r}, expected {frame!r}", topic, time_ns))
+        if parsed.timestamp.seconds * 1_000_000_000 + parsed.timestamp.nanos != time_ns:
+            self._add(warning("time", "its timestamp is not its log_time", topic, time_ns))

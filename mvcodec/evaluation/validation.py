@@ -154,6 +154,7 @@ class _StreamCheck:
             self._add(error("header", f"no header on {HEADER_TRACK.topic}"))
             return
         self._tell_sets(self._assembler.flush())
+        self._end_set()
         assert self._messages is not None
         self.findings += self._messages.end()
         said = check.metadata.get(METADATA_NAME, {}).get("header")
@@ -214,7 +215,12 @@ class _StreamCheck:
             if record.sequence != index and record.log_time < time_ns:
                 self._add(error("order", f"a time before {time_ns / 1e9:.3f} s, which came first", *where))
         if self._now is None or record.sequence != self._now[0]:
+            self._end_set()
             self._now = record.sequence, record.log_time
+
+    def _end_set(self) -> None:
+        if self._now is not None and self._messages is not None:
+            self._messages.end_set(self._now[1])
 
     def _push_unit(self, track: Track, message: CheckedMessage, data: bytes) -> None:
         record = message.record
