@@ -250,7 +250,9 @@ class CameraArray:
             SettingError: more than one row (column) asked of an array with one, or none at all.
         """
         if rows < 1 or cols < 1 or (self.rows == 1 and rows > 1) or (self.cols == 1 and cols > 1):
-            expected = f"{'1' if self.rows == 1 else 'R'}x{'1' if self.cols == 1 else 'C'} with R, C >= 1"
+            down, across = "1" if self.rows == 1 else "R", "1" if self.cols == 1 else "C"
+            free = ", ".join(name for name in (down, across) if name != "1")
+            expected = f"{down}x{across}{' with ' + free + ' >= 1' if free else ''}"
             raise SettingError("grid", f"{rows}x{cols}", expected)
         return tuple(
             Viewpoint(_spread(row, rows, self.rows), _spread(col, cols, self.cols))

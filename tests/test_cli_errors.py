@@ -151,6 +151,61 @@ def test_json_and_the_stream_cannot_both_be_standard_output(array: Path, coded: 
     assert "--json: found with OUT -" in fails(2, "decode", coded, "-", "--format", "mcap", "--json")
 
 
+def test_settings_are_called_as_their_options_are(coded: Path, tmp_path: Path) -> None:
+    out, row = tmp_path / "out", write_array(tmp_path / "row", 1, 3, frames=1)
+    line = fails(2, "decode", coded, out, "--view", "5,5")
+    assert line == "mvcodec: error: --view: found 5,5, expected row 0..2, col 0..2"
+    line = fails(2, "decode", coded, out, "--frames", "5:")
+    assert line.startswith("mvcodec: error: --frames: found 5:, expected at least one frame set of the 2 in")
+    line = fails(2, "decode", coded, out, "--synthesizer", "brush")
+    assert line.startswith("mvcodec: error: --synthesizer: found brush, expected one of layered, ")
+    succeeds("encode", row, tmp_path / "row.mcap", *FIXED_RANGE)
+    line = fails(2, "decode", tmp_path / "row.mcap", out, "--grid", "3x3")
+    assert line == "mvcodec: error: --grid: found 3x3, expected 1xC with C >= 1"
+    line = fails(2, "encode", row, tmp_path / "o.mcap", "--depth", "raw16")
+    assert line.startswith("mvcodec: error: --calibration: found none given, expected one in the input")
+
+
+@pytest.mark.parametrize(
+    ("command", "complaint"),
+    [
+        (
+            "export-points {} o.ply --nominal --max-depth -1",
+            "--max-depth: found '-1', expected a number above 0",
+        ),
+        ("export-points {} o.ply --nominal --max-depth nan", "found 'nan', expected a number above 0"),
+        ("render {} o.png --refocus 1e30", "--refocus: found 1e+30, expected at most 96 px"),
+        ("encode x.mcap o.mcap --topics=", "--topics: found '', expected a topic for every view"),
+        ("encode x.mcap o.mcap --topics /a,,/b", "--topics: found '/a,,/b', expected a topic for every view"),
+    ],
+)
+def test_values_that_make_no_sense_are_refused(
+    coded: Path, tmp_path: Path, command: str, complaint: str
+) -> None:
+    line = fails(2, *command.replace(" o.", f" {tmp_path}/o.").replace("x.mcap", "{}").format(coded).split())
+    assert complaint in line
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "render {} {}/x.png",
+        "render {} {}/x.mp4",
+        "recover {} {}/x.mcap",
+        "decode {} {}/x.mp4 --format mosaic",
+        "decode {} {}/x.mcap --format mcap",
+        "export-points {} {}/x.ply --nominal",
+        "export-points {} {}/x.mcap --nominal",
+    ],
+)
+def test_the_folder_of_a_file_must_be_there(coded: Path, tmp_path: Path, command: str) -> None:
+    folder = tmp_path / "missing" / "deeper"
+    line = fails(1, *command.format(coded, folder).split())
+    assert line.endswith(f"cannot be written: there is no folder {folder}")
+    assert not folder.parent.exists()
+
+
 def test_a_file_that_is_no_mcap(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     for data in (b"", b"no MCAP at all" * 100):

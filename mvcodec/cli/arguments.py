@@ -7,10 +7,37 @@ import math
 import re
 from collections.abc import Sequence
 
-NEGATIVE_VALUES = ("--disparity-range", "--frames", "--refocus", "--view")
+from mvcodec.errors import SettingError
+
+NEGATIVE_VALUES = ("--disparity-range", "--frames", "--max-depth", "--refocus", "--view")
 """Options whose value may begin with a minus sign."""
 
+OPTIONS = {
+    "viewpoint": "--view",
+    "synthesizer": "--synthesizer",
+    "grid": "--grid",
+    "frames": "--frames",
+    "calibration": "--calibration",
+    "qp": "--qp",
+    "crf": "--crf",
+    "bitrate_kbps": "--bitrate",
+    "disparity_qp": "--disparity-qp",
+    "disparity_scale": "--disparity-scale",
+    "disparity_cameras": "--disparity-cameras",
+    "disparity_median": "--disparity-median",
+    "gop": "--gop",
+    "matcher": "--matcher",
+    "preset": "--preset",
+    "codec": "--codec",
+}
+"""The options behind the library's settings."""
+
 DEFAULT_SYNTHESIZER = "layered"
+
+
+def as_option(error: SettingError) -> SettingError:
+    """The same error with the library's setting under the name of its option."""
+    return SettingError(OPTIONS.get(error.setting, error.setting), error.found, error.expected)
 
 
 def join_negative_values(argv: Sequence[str]) -> list[str]:
@@ -63,6 +90,17 @@ def positive_int(text: str) -> int:
     if not re.fullmatch(r"\d{1,9}", text) or int(text) < 1:
         raise argparse.ArgumentTypeError(f"found {text!r}, expected a whole number of at least 1")
     return int(text)
+
+
+def positive_number(text: str) -> float:
+    """A number above 0, which may be infinite."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not number > 0:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a number above 0")
+    return number
 
 
 def _two_numbers(text: str, expected: str) -> tuple[float, float]:

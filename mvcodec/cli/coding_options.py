@@ -10,33 +10,12 @@ from mvcodec.capture import ArraySource
 from mvcodec.cli.arguments import disparity_qp, disparity_range, pair_of_sizes
 from mvcodec.cli.paths import local_path
 from mvcodec.encoder import Encoder, EncoderConfig
-from mvcodec.errors import SettingError
 from mvcodec.frames import FrameSet
 from mvcodec.layers.refinement import matcher_choices
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
 from mvcodec.stream import DISPARITY_CAMERAS
 from mvcodec.video.codec import PRESETS
 from mvcodec.video.table import CODECS
-
-_OPTIONS = {
-    "qp": "--qp",
-    "crf": "--crf",
-    "bitrate_kbps": "--bitrate",
-    "disparity_qp": "--disparity-qp",
-    "disparity_scale": "--disparity-scale",
-    "disparity_cameras": "--disparity-cameras",
-    "disparity_median": "--disparity-median",
-    "gop": "--gop",
-    "matcher": "--matcher",
-    "preset": "--preset",
-    "codec": "--codec",
-}
-"""The encoder's settings as the user wrote them."""
-
-
-def as_option(error: SettingError) -> SettingError:
-    """The same error with the encoder's setting under the name of its option."""
-    return SettingError(_OPTIONS.get(error.setting, error.setting), error.found, error.expected)
 
 
 def add_input(parser: argparse.ArgumentParser, what: str) -> None:
@@ -121,21 +100,18 @@ def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: 
     Raises:
         SettingError: one does not fit.
     """
-    try:
-        config = EncoderConfig(
-            disparity_qp=arguments.disparity_qp,
-            disparity_scale=arguments.disparity_scale,
-            disparity_cameras=arguments.disparity_cameras,
-            disparity_median=arguments.disparity_median,
-            gop=arguments.gop,
-            matcher=arguments.matcher,
-            preset=arguments.preset,
-            codec=arguments.codec,
-            **others,
-        )
-        Encoder(array, config).flush()
-    except SettingError as error:
-        raise as_option(error) from None
+    config = EncoderConfig(
+        disparity_qp=arguments.disparity_qp,
+        disparity_scale=arguments.disparity_scale,
+        disparity_cameras=arguments.disparity_cameras,
+        disparity_median=arguments.disparity_median,
+        gop=arguments.gop,
+        matcher=arguments.matcher,
+        preset=arguments.preset,
+        codec=arguments.codec,
+        **others,
+    )
+    Encoder(array, config).flush()
     return config
 
 

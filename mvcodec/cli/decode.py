@@ -15,7 +15,7 @@ from typing import BinaryIO, cast
 from mvcodec.array import Viewpoint
 from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, pair_of_sizes, view
 from mvcodec.cli.interrupt import deferred_interrupt
-from mvcodec.cli.paths import local_path
+from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.cli.standard_streams import STANDARD, standard_input, standard_output
@@ -165,8 +165,7 @@ def _check_output(form: str, arguments: argparse.Namespace) -> None:
     if path.suffix.lower() not in suffixes and not (form == MCAP and str(path) == STANDARD):
         expected = f"a name that ends in {' or '.join(suffixes)} for --format {form}"
         raise SettingError("OUT", path, expected)
-    if path.is_dir():
-        raise OutputError(path, f"it is a folder, --format {form} needs a file")
+    check_file_target(path)
 
 
 def _open_sink(form: str, arguments: argparse.Namespace, plan: OutputPlan, outputs: ExitStack) -> Sink:

@@ -26,7 +26,7 @@ from mvcodec.cli.encode_stream import (
 from mvcodec.cli.info import document, summary
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_view import add_live_view, live_view
-from mvcodec.cli.paths import local_path
+from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_chunk_ms
 from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD
@@ -34,7 +34,7 @@ from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.container import McapWriter, read_info
 from mvcodec.depth import require_calibration
 from mvcodec.encoder import Encoder, EncoderConfig
-from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
+from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.output.live_view import LiveView
 
 SUFFIX = ".mcap"
@@ -157,10 +157,7 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
     if output.suffix.lower() != SUFFIX:
         # It would most likely be the last INPUT, with OUT forgotten.
         raise SettingError("OUT", output, f"a file name that ends in {SUFFIX}")
-    if output.is_dir():
-        raise OutputError(output, "it is a folder")
-    if not output.parent.is_dir():
-        raise OutputError(output, f"there is no folder {output.parent}")
+    check_file_target(output)
 
 
 def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:

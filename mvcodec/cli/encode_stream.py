@@ -164,6 +164,9 @@ def _topic_grid(arguments: argparse.Namespace) -> tuple[tuple[str, ...], ...]:
     rows = tuple(
         tuple(topic.strip() for topic in row.split(",")) for row in arguments.topics.strip(";").split(";")
     )
+    if not all(all(row) for row in rows):
+        expected = "a topic for every view, such as '/a,/b;/c,/d'"
+        raise SettingError("--topics", repr(arguments.topics), expected)
     if arguments.grid is None:
         return rows
     names = [name for row in rows for name in row]

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from mvcodec.array import CameraArray
 from mvcodec.capture import open_input, resolve_frames
 from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, positive_int
-from mvcodec.cli.coding_options import add_coding, add_input, as_option, checked_config, find_range
+from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.progress import progress
-from mvcodec.errors import MissingExtra, MvCodecWarning, OutputError, SettingError
+from mvcodec.errors import MissingExtra, MvCodecWarning, OutputError
 from mvcodec.synthesis.table import make_synthesizer
 from mvcodec.video.table import CODECS
 
@@ -126,17 +126,14 @@ def _study(array: CameraArray, arguments: argparse.Namespace, range_px: tuple[fl
 
     make_synthesizer(arguments.synthesizer)  # a wrong name is told before anything is measured
     config = checked_config(array, arguments, disparity_range_px=range_px)
-    try:
-        return Study(
-            qps=arguments.qp or translate_qps(DEFAULT_QPS, "h264", arguments.codec),
-            config=config,
-            synthesizer=arguments.synthesizer,
-            anchors=arguments.anchors or tuple(ANCHORS),
-            anchor_codecs=arguments.anchor_codecs or tuple(CODECS),
-            jobs=arguments.jobs,
-        )
-    except SettingError as error:
-        raise as_option(error) from None
+    return Study(
+        qps=arguments.qp or translate_qps(DEFAULT_QPS, "h264", arguments.codec),
+        config=config,
+        synthesizer=arguments.synthesizer,
+        anchors=arguments.anchors or tuple(ANCHORS),
+        anchor_codecs=arguments.anchor_codecs or tuple(CODECS),
+        jobs=arguments.jobs,
+    )
 
 
 def _whole_numbers(text: str) -> tuple[int, ...]:

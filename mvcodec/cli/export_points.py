@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from mvcodec.capture.manifest import read_calibration
-from mvcodec.cli.arguments import add_frames, add_output_options, positive_int
-from mvcodec.cli.paths import local_path
+from mvcodec.cli.arguments import add_frames, add_output_options, positive_int, positive_number
+from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.container.point_writer import PointWriter
 from mvcodec.decoder import Decoder
 from mvcodec.depth import points_of, require_calibration
-from mvcodec.errors import OutputError, SettingError
+from mvcodec.errors import SettingError
 from mvcodec.output.ply import write_ply
 
 SUFFIXES = (".mcap", ".ply")
@@ -31,7 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--stride", type=positive_int, default=1, metavar="N", help="every Nth pixel")
     parser.add_argument(
-        "--max-depth", type=float, default=float("inf"), metavar="M", help="leave out what is farther, metres"
+        "--max-depth",
+        type=positive_number,
+        default=float("inf"),
+        metavar="M",
+        help="leave out what is farther, metres",
     )
     parser.add_argument(
         "--calibration", type=Path, metavar="FILE", help="JSON with the calibration as in array.json"
@@ -49,8 +53,7 @@ def run(arguments: argparse.Namespace) -> None:
     suffix = target.suffix.lower()
     if suffix not in SUFFIXES:
         raise SettingError("OUT", target, f"a name that ends in {' or '.join(SUFFIXES)}")
-    if target.is_dir():
-        raise OutputError(target, "it is a folder")
+    check_file_target(target)
     if target.resolve() == Path(arguments.input).resolve():
         raise SettingError("OUT", target, "another file than IN.mcap")
     with (

@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 import mvcodec
-from mvcodec.cli.arguments import join_negative_values
+from mvcodec.cli.arguments import as_option, join_negative_values
 from mvcodec.cli.standard_streams import ReaderGone, checked_streams
 from mvcodec.cli.warning_lines import WarningLines
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
@@ -74,7 +74,7 @@ def _run(arguments: Sequence[str]) -> int:
     try:
         _module(parsed.command).run(parsed)
     except SettingError as error:
-        return _fail(error, EXIT_USAGE)
+        return _fail(as_option(error), EXIT_USAGE)
     except ReaderGone:
         return EXIT_FAILURE
     except (MvCodecError, OSError) as error:

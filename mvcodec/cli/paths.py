@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from mvcodec.container.remote import is_url
+from mvcodec.errors import OutputError
 
 
 def local_path(text: str) -> Path:
@@ -13,3 +14,14 @@ def local_path(text: str) -> Path:
     if is_url(text):
         raise argparse.ArgumentTypeError(f"found {text}, expected a file or folder on this machine")
     return Path(text)
+
+
+def check_file_target(path: Path) -> None:
+    """Raise OutputError where a file cannot be: a folder is there, or none that it could lie in.
+
+    A folder that the user mistyped is not made, so that the file is not looked for in vain.
+    """
+    if path.is_dir():
+        raise OutputError(path, "it is a folder")
+    if not path.parent.is_dir():
+        raise OutputError(path, f"there is no folder {path.parent}")

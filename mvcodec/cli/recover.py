@@ -6,10 +6,10 @@ import argparse
 import warnings
 
 from mvcodec.cli.info import count
-from mvcodec.cli.paths import local_path
+from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.safety import add_limits
 from mvcodec.container.limits import Limits
-from mvcodec.errors import MvCodecWarning, OutputError, SettingError, StreamError
+from mvcodec.errors import MvCodecWarning, SettingError, StreamError
 from mvcodec.output.recovery import recover
 
 
@@ -32,8 +32,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Copy what is whole; say what is not."""
     if arguments.output.resolve() == arguments.input.resolve():
         raise SettingError("OUT", arguments.output, "another file than IN.mcap")
-    if arguments.output.is_dir():
-        raise OutputError(arguments.output, "it is a folder")
+    check_file_target(arguments.output)
     limits = Limits(**dict(arguments.limit))
     result = recover(arguments.input, arguments.output, _warn, limits, arguments.incomplete)
     if not arguments.quiet:

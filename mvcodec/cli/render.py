@@ -12,13 +12,13 @@ from tqdm import tqdm
 
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, pair_of_sizes, view
-from mvcodec.cli.paths import local_path
+from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.container import McapReader
 from mvcodec.container.limits import Limits
 from mvcodec.decoder import Decoder
-from mvcodec.errors import OutputError, SettingError, StreamError
+from mvcodec.errors import SettingError, StreamError
 from mvcodec.frames import Picture
 from mvcodec.output.light_field import quilt_path
 from mvcodec.output.picture_file import STILL_SUFFIX, WRITERS, find_writer
@@ -106,8 +106,7 @@ def _check_settings(arguments: argparse.Namespace) -> None:
     output = arguments.output
     if Path(arguments.input).resolve() == output.resolve():
         raise SettingError("OUT", output, "another file than FILE.mcap")
-    if output.is_dir():
-        raise OutputError(output, "it is a folder")
+    check_file_target(output)
     if arguments.path is not None and output.suffix.lower() == STILL_SUFFIX:
         raise SettingError("--path", arguments.path, f"none for {output.name}, which holds one picture")
 

@@ -63,6 +63,9 @@ class ShotSettings:
             raise SettingError(
                 "--grid", f"{self.grid[0]}x{self.grid[1]}", f"{MAX_VIEWS} views in one picture at most"
             )
+        if self.focus_px is not None and not abs(self.focus_px) <= self.array.width:
+            expected = f"at most {self.array.width} px, a picture's width, either way"
+            raise SettingError("--refocus", f"{self.focus_px:g}", expected)
 
     @classmethod
     def of(cls, decoded: DecodedSet, grid: Grid | None = None, focus_px: float | None = None) -> ShotSettings:
