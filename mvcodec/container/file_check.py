@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import io
-import zlib
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import (
     Channel,
     ChunkIndex,
-    DataEnd,
-    Footer,
     Message,
     MessageIndex,
     Metadata,
@@ -23,26 +18,21 @@ from mcap.records import (
     Schema,
 )
 
-from mvcodec.container.data_section import SUMMARY_RECORDS, DataSection
-from mvcodec.container.exact_file import ExactFile
+from mvcodec.container.data_section import DataSection
 from mvcodec.container.file_index import FileIndex, read_index
-from mvcodec.container.finding import Finding, error
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.container.record_walk import RecordWalk
 from mvcodec.container.records import (
-    DAMAGE,
     HEAD,
     MAGIC,
-    CutOff,
     RecordError,
     chunk_places,
     find_chunk,
     parse_chunk,
     parse_message,
-    read_record,
     unpack,
 )
-
-_CRC_BYTES = 4
+from mvcodec.container.summary_check import check_summary
 
 _IN_DATA = {
     Opcode.SCHEMA,
@@ -87,14 +77,13 @@ class FileCheck:
     """
 
     def __init__(self, file: BinaryIO, limits: Limits = DEFAULT_LIMITS) -> None:
-        self._file, self._limits = ExactFile(file), limits
-        self.findings: list[Finding] = []
+        self._walk, self._limits = RecordWalk(file, limits), limits
+        self.findings = self._walk.findings
+        self._tell, self._parsed = self._walk.tell, self._walk.parsed
         self.metadata: dict[str, dict[str, str]] = {}
         self._seen = DataSection()
         self._message_indexes: dict[int, MessageIndex] | None = None
         self._damaged: _DamagedChunk | None = None
-        self._time_ns: int | None = None
-        self._whole = True
         self._unknown: set[int] = set()
         self._index: FileIndex | None = None
 
@@ -118,23 +107,23 @@ class FileCheck:
     def messages(self) -> Iterator[CheckedMessage]:
         """Go through the file."""
         with suppress(RecordError):  # a damaged summary is told where it stands
-            self._index = read_index(self._file, self._limits)
-        self._file.seek(0)
-        if self._file.read(len(MAGIC)) != MAGIC:
+            self._index = read_index(self._walk.file, self._limits)
+        self._walk.file.seek(0)
+        if self._walk.file.read(len(MAGIC)) != MAGIC:
             self._tell("magic", "the file does not begin as MCAP does")
-            if not find_chunk(self._file, self._limits):
+            if not find_chunk(self._walk.file, self._limits):
                 return
         first = True
-        while (record := self._next()) is not None:
+        while (record := self._walk.next()) is not None:
             opcode, content, place = record
-            if first and opcode != Opcode.HEADER and self._whole:
+            if first and opcode != Opcode.HEADER and self._walk.whole:
                 self._tell("header", "the first record is no header")
             if opcode == Opcode.HEADER and not first:
                 self._tell("header", "a second header")
             first = False
             if opcode == Opcode.DATA_END:
                 self._end_message_indexes()
-                self._check_summary(place, content)
+                check_summary(self._walk, self._seen, place, content)
                 return
             if opcode == Opcode.CHUNK:
                 self._end_message_indexes()
@@ -144,10 +133,6 @@ class FileCheck:
             elif opcode != Opcode.HEADER:
                 self._tell("record", f"a record of kind {opcode} among the data")
         self._end_message_indexes()
-
-    def _tell(self, code: str, message: str, topic: str | None = None, time_ns: int | None = None) -> None:
-        time_ns = self._time_ns if time_ns is None else time_ns
-        self.findings.append(error(code, message, topic, time_ns))
 
     def _topic(self, number: int) -> str | None:
         """The topic of a channel, if it is known."""
@@ -171,29 +156,6 @@ class FileCheck:
             text += f", {time_ns / 1e9:.3f}..{end_ns / 1e9:.3f} s"
         self._tell("chunk", text, topics[0] if topics else None, time_ns)
 
-    def _next(self) -> tuple[int, bytes, int] | None:
-        """The next record and its place; None where there is none (which is told)."""
-        while True:
-            place = self._file.place
-            try:
-                record = read_record(self._file, self._limits)
-            except CutOff as cut:
-                self._file.give_back(cut.content)
-                if not (cut.content and find_chunk(self._file, self._limits)):
-                    self._tell("cut-off", "the file breaks off here")
-                    return None
-                self._tell("record", "a record that is longer than what follows")
-            except RecordError as damage:
-                self._tell("record", str(damage))
-                if not find_chunk(self._file, self._limits):
-                    return None
-            else:
-                if record is None:
-                    self._tell("cut-off", "the file breaks off here")
-                    return None
-                return record[0], record[1], place
-            self._whole = False
-
     def _chunk(self, content: bytes, place: int) -> Iterator[CheckedMessage]:
         self._message_indexes = {}
         times_ns = None
@@ -215,7 +177,7 @@ class FileCheck:
             messages = self._unpacked(unpack(head, packed, self._limits))
         except RecordError as damage:
             self._damaged = _DamagedChunk(str(damage), times_ns, [])
-            self._whole = False
+            self._walk.whole = False
             return
         times = [message.record.log_time for message in messages]
         first = messages[0].topic if messages else None
@@ -244,11 +206,11 @@ class FileCheck:
     def _message(self, content: bytes) -> tuple[CheckedMessage | None, int]:
         record = parse_message(content)
         seen, number = self._seen, record.channel_id
-        self._time_ns = record.log_time
+        self._walk.time_ns = record.log_time
         seen.count(number, record.log_time)
         known = self._known(number)
         channel = known.channels.get(number)
-        if channel is None or (known is not seen and self._whole):
+        if channel is None or (known is not seen and self._walk.whole):
             self._tell_unknown(number)
         if channel is None:
             return None, number
@@ -325,59 +287,3 @@ class FileCheck:
                 text = f"no message index of channel {number} behind its chunk"
                 self._tell("message-index", text, self._topic(number))
         self._message_indexes = self._damaged = None
-
-    def _parsed(self, kind: Any, content: bytes) -> Any:
-        """A record of the MCAP library's kind; None (told) where it is damaged."""
-        try:
-            stream = ReadDataStream(io.BytesIO(content))
-            record = kind.read(stream)
-        except DAMAGE as damage:
-            self._tell("record", f"a damaged {kind.__name__} ({str(damage) or type(damage).__name__})")
-            return None
-        if stream.count != len(content):
-            self._tell("record", f"a {kind.__name__} with bytes behind its end")
-        return record
-
-    def _check_summary(self, data_end: int, content: bytes) -> None:
-        crc = self._parsed(DataEnd, content)
-        start = self._file.place
-        if self._whole and crc is not None and crc.data_section_crc:
-            self._file.seek(0)
-            self._file.skip(data_end)
-            if self._file.crc != crc.data_section_crc:
-                self._tell("data-crc", "data whose checksum is wrong")
-            self._file.seek(start)
-        found: dict[int, list[Any]] = {}
-        while (record := self._next()) is not None:
-            opcode, body, place = record
-            if opcode == Opcode.FOOTER:
-                self._check_footer(body, start, place)
-                break
-            kind = SUMMARY_RECORDS.get(opcode)
-            if kind is not None:
-                found.setdefault(opcode, []).append(self._parsed(kind, body))
-            elif opcode != Opcode.SUMMARY_OFFSET:
-                self._tell("record", f"a record of kind {opcode} in the summary")
-        else:
-            return
-        if self._whole:
-            for difference in self._seen.differences(found):
-                self._tell("summary", difference)
-
-    def _check_footer(self, content: bytes, start: int, place: int) -> None:
-        footer = self._parsed(Footer, content)
-        if footer is None:
-            return
-        if footer.summary_start != start:
-            self._tell("footer", f"a summary at {footer.summary_start}, found at {start}")
-        end = self._file.place
-        if footer.summary_crc:
-            self._file.seek(start)
-            covered = self._file.read(place + HEAD.size + len(content) - _CRC_BYTES - start)
-            if zlib.crc32(covered) != footer.summary_crc:
-                self._tell("summary-crc", "a summary whose checksum is wrong")
-            self._file.seek(end)
-        if self._file.read(len(MAGIC)) != MAGIC:
-            self._tell("magic", "the file does not end as MCAP does")
-        elif self._file.read(1):
-            self._tell("magic", "something behind the end")

@@ -91,7 +91,7 @@ def _kind(file: BinaryIO, limits: Limits) -> FileKind | None:
     for message in check.messages():
         if message.topic == HEADER_TRACK.topic:
             return FileKind.ARRAY
-        if check.indexed:
+        if check.indexed or len(check.findings) > MAX_FINDINGS:
             break
     if HEADER_TRACK.topic in check.topics or METADATA_NAME in check.metadata:
         return FileKind.ARRAY
