@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import heapq
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -17,12 +19,13 @@ from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.kernels.growth import nearest_seeds
 from mvcodec.layers.dlr import DlrSettings, refine
-from mvcodec.layers.refinement import matcher_by_name
+from mvcodec.layers.refinement import matcher_by_name, matcher_choices
 from mvcodec.layers.segments import split_picture
 from mvcodec.stereo.consistency import median
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
+ROOT = Path(__file__).parents[1]
+DATA = ROOT.parent / "shared" / "data"
 SIZES = [(9, 13), (1, 1), (1, 17), (6, 1), (4, 5)]
 
 
@@ -192,6 +195,16 @@ def test_unknown_names_and_bad_settings_are_refused() -> None:
     ):
         with pytest.raises(SettingError, match=text):
             DlrSettings(**settings)
+
+
+@pytest.mark.parametrize("command", ["encode", "evaluate"])
+def test_help_and_errors_name_the_refinements(command: str) -> None:
+    choices = matcher_choices()
+    assert choices.startswith("one of joint, ")
+    assert choices.endswith("adcensus, with +dlr or +dlr-thesis behind it if wanted")
+    run = [sys.executable, "-m", "mvcodec", command, "--help"]
+    shown = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert choices in " ".join(shown.split()).replace("dlr- thesis", "dlr-thesis")
 
 
 def test_the_encoder_takes_a_refined_matcher_by_name() -> None:
