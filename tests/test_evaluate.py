@@ -75,7 +75,19 @@ def test_report_has_the_documented_form(array: Path, measured: Path) -> None:
         assert low < high
         assert isinstance(delta["all"], float)
         assert (delta["virtual"] is None) == (delta["virtual_overlap_db"] is None)
-    assert document["versions"]["av"]
+    assert document["pictures"]
+    for curve in document["curves"]:
+        (versions,) = curve["versions"]
+        assert {
+            "mvcodec",
+            "python",
+            "av",
+            "numpy",
+            "numba",
+            "opencv-python-headless",
+            "ffmpeg",
+        } <= versions.keys()
+        assert versions.items() <= document["versions"].items()
 
 
 def test_bits_of_our_own_curve_are_those_of_the_file_with_its_container(measured: Path) -> None:
@@ -202,6 +214,7 @@ def test_weak_figures_are_told_in_every_place(array: Path, measured: Path, tmp_p
         warnings = document["bd_rate"][name]["warnings"]
         assert any(text.startswith(reason) for text in warnings), warnings
         told.add(f"BD figures against {label}: {'; '.join(warnings)}")
+    assert "simulcast, no B-frames, AV1; simulcast, B-frames, AV1" in page, "points of one set of versions"
     for text in told:
         assert f"mvcodec: warning: {text}" in done.stderr.splitlines()
         assert f"<li>{text}</li>" in page
