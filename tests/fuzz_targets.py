@@ -75,7 +75,7 @@ def parse_nal(data: bytes) -> None:
         H264Parser().push(data)
     for rules in UNIT_RULES.values():
         checker = rules(TrackKind.TEXTURE, (64, 48))
-        for keyframe in (True, False):
+        for keyframe in (True, False, None):
             list(checker.push(data, keyframe))
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import av
 import numpy as np
 import pytest
 from broken_files import rewritten
@@ -176,6 +178,22 @@ def test_missing_keyframes_and_pictures_and_times_are_found(views: bytes, tmp_pa
     ):
         codes = {code for code, *_ in _examined(_changed(views, CompressedVideo, change), tmp_path)[1]}
         assert expected in codes
+
+
+def test_b_frames_are_found_in_anyones_video(tmp_path: Path) -> None:
+    coder = av.CodecContext.create("libx264", "w")
+    assert isinstance(coder, av.VideoCodecContext)
+    coder.width, coder.height, coder.pix_fmt, coder.framerate = 48, 32, "yuv420p", Fraction(10)
+    coder.time_base, coder.options = Fraction(1, 10), {"bf": "2", "b-adapt": "0", "g": "8"}
+    pictures = [frame_set(ARRAY, index).pictures[0, 0] for index in range(8)]
+    coded = [packet for picture in pictures for packet in coder.encode(av.VideoFrame.from_ndarray(picture))]
+    path = tmp_path / "x.mcap"
+    with VideoTopicsWriter(path, ARRAY, {"0": Viewpoint(0, 0)}, "h264") as writer:
+        for index, packet in enumerate([*coded, *coder.encode(None)]):
+            writer.push(index, index * 100_000_000, index == 0, [bytes(packet)])
+    found = examine(path)
+    assert found.kind is FileKind.VIEWS
+    assert "b-frames" in {finding.code for finding in found.findings}
 
 
 def test_calibration_and_places_must_be_the_videos(views: bytes, tmp_path: Path) -> None:
