@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvcodec.kernels.view_fetch import BORDER, CONTOUR, cubic, cubic_weights, linear, linear_edge
+from mvcodec.kernels.view_fetch import BORDER, CONTOUR, cubic, cubic_weights, linear, linear_edge, place_of
 
 FloatMap = NDArray[np.float32]
 ByteMap = NDArray[np.uint8]
@@ -25,12 +25,9 @@ def _see(x, y, d, cameras, planes, shifts, weights, tolerance, edge_trust, sharp
     stride = width + 2 * BORDER
     total = grey = red = blue = np.float32(0)
     for i in range(cameras.size):
-        at_x = np.float32(x) + shifts[i, 0] * d
-        at_y = np.float32(y) + shifts[i, 1] * d
-        if not (-0.5 < at_x < width - 0.5 and -0.5 < at_y < height - 0.5):
+        at_x, at_y, inside = place_of(x, y, d, shifts[i, 0], shifts[i, 1], width, height)
+        if not inside:
             continue
-        at_x = min(max(at_x, np.float32(0)), np.float32(width - 1))
-        at_y = min(max(at_y, np.float32(0)), np.float32(height - 1))
         left, top = int(at_x), int(at_y)
         part_x, part_y = at_x - np.float32(left), at_y - np.float32(top)
         place = (cameras[i] * (height + 2 * BORDER) + top + BORDER) * stride + left + BORDER
@@ -118,16 +115,7 @@ def _locate(y, disparity, shift, shape, places, parts):  # type: ignore[no-untyp
     stride = np.int32(width + 2 * BORDER)
     shift_x, shift_y = shift
     for x in range(width):
-        at_x = np.float32(x) + shift_x * disparity[x]
-        at_y = np.float32(y) + shift_y * disparity[x]
-        inside = (
-            (at_x > np.float32(-0.5))
-            & (at_y > np.float32(-0.5))
-            & (at_x < np.float32(width - 0.5))
-            & (at_y < np.float32(height - 0.5))
-        )
-        at_x = min(max(at_x, np.float32(0)), np.float32(width - 1))
-        at_y = min(max(at_y, np.float32(0)), np.float32(height - 1))
+        at_x, at_y, inside = place_of(x, y, disparity[x], shift_x, shift_y, width, height)
         left, top = np.int32(at_x), np.int32(at_y)
         parts[0, x], parts[1, x] = at_x - np.float32(left), at_y - np.float32(top)
         place = (top + np.int32(BORDER)) * stride + left + np.int32(BORDER)

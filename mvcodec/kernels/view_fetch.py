@@ -15,6 +15,22 @@ CONTOUR = np.float32(-1e9)
 
 
 @njit(cache=True, nogil=True, inline="always")
+def place_of(x, y, d, shift_x, shift_y, width, height):  # type: ignore[no-untyped-def]
+    """Where a camera sees the view's point (x, y) at disparity d, kept inside, and whether it was."""
+    at_x = np.float32(x) + shift_x * d
+    at_y = np.float32(y) + shift_y * d
+    inside = (
+        (at_x > np.float32(-0.5))
+        & (at_y > np.float32(-0.5))
+        & (at_x < np.float32(width - 0.5))
+        & (at_y < np.float32(height - 0.5))
+    )
+    at_x = min(max(at_x, np.float32(0)), np.float32(width - 1))
+    at_y = min(max(at_y, np.float32(0)), np.float32(height - 1))
+    return at_x, at_y, inside
+
+
+@njit(cache=True, nogil=True, inline="always")
 def cubic_weights(t, a):  # type: ignore[no-untyped-def]
     """The four weights of cubic convolution at fraction t (Keys 1981, equation 15, parameter a)."""
     s = np.float32(1) - t

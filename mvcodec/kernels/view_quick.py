@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvcodec.kernels.view_fetch import place_of
+
 FloatMap = NDArray[np.float32]
 
 STEPS = 16
@@ -46,16 +48,7 @@ def _locate(y, disparity, shift, shape, places, nearest, parts):  # type: ignore
     shift_x, shift_y = shift
     steps, half, one = np.int32(STEPS), np.int32(STEPS // 2), np.float32(STEPS)
     for x in range(width):
-        at_x = np.float32(x) + shift_x * disparity[x]
-        at_y = np.float32(y) + shift_y * disparity[x]
-        inside = (
-            (at_x > np.float32(-0.5))
-            & (at_y > np.float32(-0.5))
-            & (at_x < np.float32(width - 0.5))
-            & (at_y < np.float32(height - 0.5))
-        )
-        at_x = min(max(at_x, np.float32(0)), np.float32(width - 1))
-        at_y = min(max(at_y, np.float32(0)), np.float32(height - 1))
+        at_x, at_y, inside = place_of(x, y, disparity[x], shift_x, shift_y, width, height)
         fine_x = np.int32(at_x * one + np.float32(0.5))
         fine_y = np.int32(at_y * one + np.float32(0.5))
         left, top = fine_x // steps, fine_y // steps
