@@ -7,7 +7,7 @@ import pytest
 import semiglobal_twins as twins
 from numpy.typing import NDArray
 
-from mvcodec.kernels import semiglobal
+from mvcodec.kernels import completion, semiglobal
 
 SIZES = [(7, 9), (1, 1), (1, 11), (8, 1), (4, 5)]
 STEPS = {
@@ -229,7 +229,7 @@ def test_confirmed_equals_its_plain_twin(
     size: tuple[int, int], steps: NDArray[np.float32], tolerance: float
 ) -> None:
     own, *others = near_maps(size, 1 + len(steps), 8)
-    found = semiglobal.confirmed(own, np.stack(others), steps, tolerance)
+    found = completion.confirmed(own, np.stack(others), steps, tolerance)
     np.testing.assert_array_equal(found, twins.confirmed(own, np.stack(others), steps, tolerance))
 
 
@@ -251,12 +251,12 @@ def test_confirmed_equals_its_plain_twin(
 def test_confirmation_weighs_agreement_against_seeing_through(others: list[float], expected: bool) -> None:
     maps = np.stack([np.full((1, 1), other, np.float32) for other in others])
     own = np.full((1, 1), 2.0, np.float32)
-    assert semiglobal.confirmed(own, maps, np.zeros((len(others), 2), np.float32), 1.0)[0, 0] == expected
+    assert completion.confirmed(own, maps, np.zeros((len(others), 2), np.float32), 1.0)[0, 0] == expected
 
 
 def test_nobody_confirms_what_is_out_of_their_frame() -> None:
     own = np.full((1, 6), 2.0, np.float32)
-    kept = semiglobal.confirmed(own, own[None], np.array([(1, 0)], np.float32), 1.0)
+    kept = completion.confirmed(own, own[None], np.array([(1, 0)], np.float32), 1.0)
     assert kept.tolist() == [[False, False, True, True, True, True]]
 
 
@@ -271,7 +271,7 @@ def test_completion_costs_equal_their_plain_twin(
     valid, *others_valid = np.random.default_rng(10).uniform(size=(1 + len(steps), *size)) < share
     volume = np.full((*size, LEVELS), 77, np.uint8)
     arguments = own, valid, np.stack(others), np.stack(others_valid), steps, low, 7.25, 40.5, 90.0
-    semiglobal.completion_costs(*arguments, volume)
+    completion.completion_costs(*arguments, volume)
     np.testing.assert_array_equal(volume, twins.completion_costs(*arguments, LEVELS))
 
 
@@ -280,14 +280,14 @@ def test_without_evidence_every_disparity_is_equally_likely() -> None:
     volume = np.full((4, 5, LEVELS), 77, np.uint8)
     maps = near_maps((4, 5), 2, 11)
     steps = np.array([(1, 0)], np.float32)
-    semiglobal.completion_costs(maps[0], nothing, maps[1:], nothing[None], steps, 0, 7, 40, 40, volume)
+    completion.completion_costs(maps[0], nothing, maps[1:], nothing[None], steps, 0, 7, 40, 40, volume)
     assert (volume == 0).all()
 
 
 def test_completion_rules_out_what_another_camera_sees_through() -> None:
     others = np.full((2, 1, 9), 1.0, np.float32)
     volume = np.full((1, 9, 5), 77, np.uint8)
-    semiglobal.completion_costs(
+    completion.completion_costs(
         np.zeros((1, 9), np.float32),
         np.zeros((1, 9), np.bool_),
         others,

@@ -24,6 +24,7 @@ from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.stereo.consistency import drop_speckles, median
 from mvcodec.stereo.exposure import camera_gains
+from mvcodec.stereo.matching_view import MatchingView, prepare_views
 from mvcodec.stereo.partners import neighbours, outside, partners, steps, unseen_border
 from mvcodec.stereo.subpixel import refine
 
@@ -114,17 +115,6 @@ class JointSettings:
             raise SettingError("JointSettings.median_size", self.median_size, "0, 3 or 5")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _View:
-    """What matching needs of a picture: float32 (3, H, W) planes, grey, census, intervals by baseline."""
-
-    planes: NDArray[np.float32]
-    grey: FloatMap
-    census: NDArray[np.uint64]
-    across: NDArray[np.float32] | None
-    down: NDArray[np.float32] | None
-
-
 class Joint:
     """The `joint` matcher."""
 
@@ -148,10 +138,10 @@ class Joint:
             def matched(
                 array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
             ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
-                return self._matched(array, _prepared(array, pictures, ones, pool), range_px, pool)
+                return self._matched(array, prepare_views(array, pictures, ones, pool), range_px, pool)
 
             gains = camera_gains(array, pictures, range_px, matched)
-            views = _prepared(array, pictures, gains, pool)
+            views = prepare_views(array, pictures, gains, pool)
             maps, valid = self._refined_maps(array, views, range_px, pool)
             extended = pool.map(
                 lambda camera: self._beyond_partners(
@@ -167,7 +157,7 @@ class Joint:
     def _refined_maps(
         self,
         array: CameraArray,
-        views: Mapping[Position, _View],
+        views: Mapping[Position, MatchingView],
         range_px: tuple[float, float],
         pool: Executor,
     ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
@@ -190,7 +180,7 @@ class Joint:
     def _matched(
         self,
         array: CameraArray,
-        views: Mapping[Position, _View],
+        views: Mapping[Position, MatchingView],
         range_px: tuple[float, float],
         pool: Executor,
     ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
@@ -201,7 +191,12 @@ class Joint:
         return raw, {camera: self._confirmed(array, camera, raw, range_px) for camera in array.real}
 
     def _decide(
-        self, array: CameraArray, camera: Position, views: Mapping[Position, _View], low: int, levels: int
+        self,
+        array: CameraArray,
+        camera: Position,
+        views: Mapping[Position, MatchingView],
+        low: int,
+        levels: int,
     ) -> FloatMap:
         """The disparity of a camera by its own pictures."""
         from mvcodec.kernels import semiglobal
@@ -228,7 +223,7 @@ class Joint:
         return self._solve(costs, view, low, settings.small_step, settings.jump, settings.least_jump)
 
     def _solve(
-        self, costs: NDArray[np.uint8], view: _View, low: int, small: float, large: float, least: float
+        self, costs: NDArray[np.uint8], view: MatchingView, low: int, small: float, large: float, least: float
     ) -> FloatMap:
         from mvcodec.kernels import semiglobal
 
@@ -249,10 +244,10 @@ class Joint:
         range_px: tuple[float, float],
     ) -> Mask:
         """Pixels that other cameras confirm, less specks where no partner sees the whole range."""
-        from mvcodec.kernels import semiglobal
+        from mvcodec.kernels import completion
 
         others = neighbours(array, camera)
-        kept: Mask = semiglobal.confirmed(
+        kept: Mask = completion.confirmed(
             raw[camera],
             np.stack([raw[other] for other in others]),
             steps(array, camera, others),
@@ -266,19 +261,19 @@ class Joint:
         self,
         array: CameraArray,
         camera: Position,
-        view: _View,
+        view: MatchingView,
         raw: Mapping[Position, FloatMap],
         valid: Mapping[Position, Mask],
         low: int,
         levels: int,
     ) -> FloatMap:
         """Decide again what nobody confirms, from its surroundings."""
-        from mvcodec.kernels import semiglobal
+        from mvcodec.kernels import completion
 
         settings = self.settings
         others = neighbours(array, camera)
         costs = np.empty((*view.grey.shape, levels), np.uint8)
-        semiglobal.completion_costs(
+        completion.completion_costs(
             raw[camera],
             valid[camera],
             np.stack([raw[other] for other in others]),
@@ -314,7 +309,7 @@ class Joint:
         return np.where(thin, disparity, smooth)
 
     def _beyond_partners(
-        self, array: CameraArray, camera: Position, view: _View, valid: Mask, disparity: FloatMap
+        self, array: CameraArray, camera: Position, view: MatchingView, valid: Mask, disparity: FloatMap
     ) -> FloatMap:
         """Replace what no partner can see: scanlines alone leave streaks there."""
         from mvcodec.kernels import geodesic
@@ -326,7 +321,7 @@ class Joint:
 
 def _refined(
     array: CameraArray,
-    views: Mapping[Position, _View],
+    views: Mapping[Position, MatchingView],
     maps: Mapping[Position, FloatMap],
     valid: Mapping[Position, Mask],
     camera: Position,
@@ -341,31 +336,3 @@ def _levels(range_px: tuple[float, float]) -> tuple[int, int]:
     low = int(np.floor(range_px[0])) - 1
     levels = int(np.ceil(range_px[1])) + 2 - low
     return low, levels + -levels % LEVELS_MULTIPLE
-
-
-def _prepared(
-    array: CameraArray,
-    pictures: Mapping[Position, Picture],
-    gains: Mapping[Position, NDArray[np.float32]],
-    pool: Executor,
-) -> dict[Position, _View]:
-    views = pool.map(lambda camera: _prepare(array, pictures[camera], gains[camera]), array.real)
-    return dict(zip(array.real, views, strict=True))
-
-
-def _prepare(array: CameraArray, picture: Picture, gain: NDArray[np.float32]) -> _View:
-    from mvcodec.kernels import census, semiglobal
-
-    planes = np.ascontiguousarray(picture.transpose(2, 0, 1)).astype(np.float32)
-    grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), np.uint8)
-    level = grey.astype(np.float32)
-    if np.any(gain != 1):
-        planes *= gain[:, None, None]
-        level = np.asarray(cv2.cvtColor(planes.transpose(1, 2, 0), cv2.COLOR_RGB2GRAY), np.float32)
-    return _View(
-        planes,
-        level,
-        census.census_transform(grey, 4, 3),
-        semiglobal.sampling_interval(planes, 1, 0) if array.col_step else None,
-        semiglobal.sampling_interval(planes, 0, 1) if array.row_step else None,
-    )
