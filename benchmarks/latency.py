@@ -24,12 +24,12 @@ from skimage import data
 
 from mvcodec.array import Calibration, CameraArray, Viewpoint
 from mvcodec.container import McapReader, McapWriter
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.live import LiveEncoding
 from mvcodec.frames import FrameSet
-from mvcodec.live import LiveEncoding
 from mvcodec.stream import Packet
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 FPS = 25.0
 WARM_UP = 10

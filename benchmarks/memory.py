@@ -21,11 +21,11 @@ import numpy as np
 
 from mvcodec.array import Calibration, CameraArray, Viewpoint
 from mvcodec.container import McapWriter
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.decoding.frame_store import FrameStore
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.frames import FrameSet
-from mvcodec.player.frame_store import FrameStore
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 WIDTH, HEIGHT, FPS = 320, 240, 25.0
 ALLOWED = 0.05

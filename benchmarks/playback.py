@@ -31,12 +31,12 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from mvcodec.array import Viewpoint
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.decoding.frame_table import read_frame_table
 from mvcodec.frames import DecodedSet
-from mvcodec.player.frame_table import read_frame_table
 from mvcodec.player.picture_maker import to_jpeg
 from mvcodec.synthesis.synthesizer import Synthesizer
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 MOVES_A_SECOND = 60
 WARM_UP_S = 4.0

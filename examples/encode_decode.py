@@ -11,9 +11,9 @@ import cv2
 from mvcodec import Viewpoint
 from mvcodec.capture import open_input
 from mvcodec.container import McapWriter
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder, EncoderConfig
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 folder, coded, picture = (Path(argument) for argument in sys.argv[1:4])
 

@@ -11,9 +11,9 @@ from player_files import SYNTHESIZER, Running, decode_picture
 from playwright.sync_api import FloatRect, Page
 
 from mvcodec.array import Viewpoint
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.frames import Picture
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 NO_CHROMIUM = "no Chromium (Debian: apt install chromium)"

@@ -11,8 +11,8 @@ from small_arrays import photograph
 
 from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.container import McapWriter
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture
 from mvcodec.stream import Packet
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from coding import Pipe, encoded_file, make_array
 from mcap.reader import make_reader
 
-from mvcodec.decoder import Decoder, OnError
+from mvcodec.decoding.decoder import Decoder, OnError
 from mvcodec.errors import MvCodecError
 
 ARRAY = make_array(48, 32, fps=10.0, rows=1, cols=2)

@@ -9,16 +9,16 @@ from contextlib import suppress
 from pathlib import Path
 
 from mvcodec.capture.recording import Recording, RecordingSettings
+from mvcodec.conformance.file_check import FileCheck
+from mvcodec.conformance.unit_rules import UNIT_RULES
 from mvcodec.container import McapReader
 from mvcodec.container.exact_file import ExactFile
-from mvcodec.container.file_check import FileCheck
 from mvcodec.container.limits import Limits
 from mvcodec.container.records import MAGIC, parse_chunk, read_record, unpack
 from mvcodec.errors import MvCodecError
 from mvcodec.stream import StreamHeader, TrackKind
 from mvcodec.video.bits import NalError
 from mvcodec.video.h264_syntax import H264Parser
-from mvcodec.video.unit_rules import UNIT_RULES
 
 CORPUS = Path(__file__).parent / "fuzz_corpus"
 LIMITS = Limits(max_record_bytes=1 << 24, max_chunk_bytes=1 << 24)

@@ -12,8 +12,8 @@ import view_twins as twins
 from plane_scene import Plane, PlaneScene
 
 from mvcodec.array import CameraArray, Position, Viewpoint
-from mvcodec.capture.scene import RoomScene, SceneSettings
 from mvcodec.frames import DecodedSet, DisparityMap, FloatMap, Mask, Picture, RenderedView
+from mvcodec.scenes.scene import RoomScene, SceneSettings
 from mvcodec.synthesis.layered import Layered
 
 LAYERED = Layered()

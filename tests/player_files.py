@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from websockets.sync.client import ClientConnection, connect
 
 from mvcodec.capture import open_input
-from mvcodec.capture.scene import SceneSettings
 from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER
 from mvcodec.container import McapWriter
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.frames import Picture
 from mvcodec.output.sample import write_sample
+from mvcodec.scenes.scene import SceneSettings
 
 FRAMES, GOP = 12, 4
 SIZE = (240, 160)

@@ -18,8 +18,8 @@ from mvcodec.array import Position
 from mvcodec.frames import Picture
 from mvcodec.stream import TrackKind
 from mvcodec.video.codec import RateControl, VideoSettings
+from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import to_planes
-from mvcodec.video.table import find_codec
 
 ARRAY = make_array(96, 64, fps=10.0)
 TOPICS = {camera: f"/cam{camera[0]}{camera[1]}" for camera in ARRAY.real}

@@ -7,7 +7,7 @@ from pathlib import Path
 from small_arrays import write_array
 
 from mvcodec.capture import open_input
-from mvcodec.encoder import EncoderConfig
+from mvcodec.encoding.encoder import EncoderConfig
 from mvcodec.evaluation.fingerprint import examine
 from mvcodec.evaluation.points import PointStore
 from mvcodec.evaluation.study import Study, StudyRun

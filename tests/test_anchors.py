@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from small_arrays import write_array
 
 from mvcodec.capture import ArraySource, open_input
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.errors import SettingError
 from mvcodec.evaluation.anchors import ANCHORS, SIMULCAST, Anchor, CodedArray, code_array
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.stream import TrackKind
 from mvcodec.video.codec import CodedPicture, Planes, RateControl, VideoEncoder, VideoSettings
+from mvcodec.video.codecs import CODECS
 from mvcodec.video.colour import grey_planes
-from mvcodec.video.table import CODECS
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mvcodec.array import Calibration
 from mvcodec.capture import open_input, resolve_frames
-from mvcodec.capture.pictures import picture_size, read_picture
+from mvcodec.capture.picture_files import picture_size, read_picture
 from mvcodec.capture.truth import read_map, read_pfm
 from mvcodec.errors import InputError, SettingError
 

@@ -13,7 +13,7 @@ import pytest
 from array_files import make_folder, picture_of, rewrite, save
 
 from mvcodec.capture import open_input
-from mvcodec.capture.pictures import picture_size, read_picture
+from mvcodec.capture.picture_files import picture_size, read_picture
 from mvcodec.errors import InputError, SettingError
 
 

@@ -17,7 +17,7 @@ from damage import COUNT, GOP, chunk_ends, outcome, small_file
 from PIL import Image
 
 from mvcodec.container import McapReader
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
 
 QUICK = ("--synthesizer", "linear")
 
@@ -219,7 +219,7 @@ import sys
 from pathlib import Path
 from coding import config, frame_set, make_array
 from mvcodec.container import McapWriter
-from mvcodec.encoder import Encoder
+from mvcodec.encoding.encoder import Encoder
 array = make_array(48, 32, fps=10.0, rows=1, cols=2)
 with Encoder(array, config(gop=7)) as encoder, McapWriter(Path(sys.argv[1]), 300) as writer:
     for index in range(250):

@@ -19,13 +19,13 @@ from recordings import ARRAY, GRID, START_NS, recording, shots
 from small_arrays import write_array
 
 from mvcodec.capture.recording import Recording, RecordingSettings
+from mvcodec.conformance.validation import validate
 from mvcodec.container import McapReader, McapWriter, read_info
 from mvcodec.container.declared import DROPPED_KEY
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.encoding.encoder import Encoder
+from mvcodec.encoding.live import WAITING_INPUT, WAITING_OUTPUT, LiveEncoding
 from mvcodec.errors import OutputError, SettingError
-from mvcodec.evaluation.validation import validate
-from mvcodec.live import WAITING_INPUT, WAITING_OUTPUT, LiveEncoding
 
 FAST = ("--preset", "ultrafast", "--disparity-range", "0,16", "--topics", GRID)
 

@@ -12,9 +12,9 @@ from PIL import Image
 from small_arrays import HEIGHT, WIDTH, picture, write_array
 
 from mvcodec.array import Calibration, Viewpoint
-from mvcodec.capture.pictures import read_picture
-from mvcodec.capture.video_file import VideoView
-from mvcodec.decoder import Decoder
+from mvcodec.capture.picture_files import read_picture
+from mvcodec.capture.video_input import VideoView
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.evaluation.metrics import psnr
 from mvcodec.frames import Picture
 from mvcodec.synthesis.linear import Linear

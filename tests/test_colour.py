@@ -12,8 +12,8 @@ from small_arrays import photograph
 from mvcodec.frames import Picture
 from mvcodec.stream import TrackKind
 from mvcodec.video.codec import Planes, RateControl, VideoSettings
+from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import even_size, forward_matrix, grey_planes, inverse_matrix, to_picture, to_planes
-from mvcodec.video.table import find_codec
 
 F32 = np.float32
 

@@ -13,7 +13,7 @@ from small_arrays import HEIGHT, WIDTH, picture, write_array
 
 from mvcodec.array import Position
 from mvcodec.capture import open_input
-from mvcodec.capture.pictures import read_picture
+from mvcodec.capture.picture_files import read_picture
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
 from mvcodec.evaluation.compare import common_frame_count, compare
 from mvcodec.evaluation.flicker import temporal_psnr

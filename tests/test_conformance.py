@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
 
 FOLDER = Path(__file__).parent / "conformance"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.mcap"))

@@ -22,7 +22,7 @@ from mcap.records import Chunk
 
 from mvcodec.container import McapReader, McapWriter
 from mvcodec.container.limits import Limits
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import SettingError, StreamError
 from mvcodec.stream import Packet, StreamHeader
 

@@ -16,11 +16,11 @@ from mcap.reader import make_reader
 from small_arrays import write_array
 
 from mvcodec.array import Calibration, CameraArray
+from mvcodec.conformance.validation import validate
 from mvcodec.container import McapWriter
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.depth import depth_m, depth_mm, points_of
-from mvcodec.encoder import Encoder
-from mvcodec.evaluation.validation import validate
+from mvcodec.encoding.encoder import Encoder
 from mvcodec.frames import DecodedSet, DisparityMap
 
 GIVEN = Calibration(100.0, 100.0, 47.5, 31.5, 0.05)

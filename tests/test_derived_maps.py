@@ -13,15 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mvcodec.array import CameraArray, Position
+from mvcodec.conformance.validation import validate
 from mvcodec.container import read_info
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.decoding.derived_maps import derive_map
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecWarning, SettingError, StreamError
-from mvcodec.evaluation.validation import validate
 from mvcodec.frames import DecodedSet, DisparityMap, FloatMap
 from mvcodec.kernels.map_projection import merge, project
 from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, map_cameras
-from mvcodec.synthesis.derived_maps import derive_map
 
 FAR_PX, NEAR_PX = -2.0, 9.0
 TOP, LEFT, SIZE = 20, 30, 24

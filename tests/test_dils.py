@@ -11,7 +11,7 @@ from mvcodec.array import Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.kernels import pairs
-from mvcodec.layers.dils import split
+from mvcodec.layers.dils_split import split
 from mvcodec.synthesis.dils import Dils, DilsSettings
 from mvcodec.synthesis.mlvs import View
 

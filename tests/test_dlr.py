@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stereo_scene import Planes, linear_or_grid
 
 from mvcodec.capture import open_input
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.kernels.growth import nearest_seeds

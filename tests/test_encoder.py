@@ -23,7 +23,7 @@ from coding import (
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.container import read_info
-from mvcodec.encoder import Encoder, default_gop
+from mvcodec.encoding.encoder import Encoder, default_gop
 from mvcodec.errors import InputError, SettingError
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stream import HEADER_TRACK, StreamHeader, TrackKind

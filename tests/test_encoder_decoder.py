@@ -27,12 +27,12 @@ from coding import (
 )
 
 from mvcodec.container import McapReader, McapWriter
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecWarning, SettingError, StreamClosed, StreamError
 from mvcodec.frames import DecodedSet
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind
-from mvcodec.video.table import find_codec
+from mvcodec.video.codecs import find_codec
 
 ARRAY = make_array()
 

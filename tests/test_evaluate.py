@@ -18,7 +18,7 @@ import pytest
 from command_line import COMMAND, fails, mvcodec, succeeds
 from small_arrays import write_array
 
-from mvcodec.capture.pictures import read_picture
+from mvcodec.capture.picture_files import read_picture
 from mvcodec.cli import evaluate
 from mvcodec.cli.main import main
 from mvcodec.container import read_info

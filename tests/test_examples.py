@@ -8,7 +8,7 @@ from pathlib import Path
 
 from small_arrays import HEIGHT, WIDTH, write_array
 
-from mvcodec.capture.pictures import read_picture
+from mvcodec.capture.picture_files import read_picture
 from mvcodec.container import read_info
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mvcodec.frames import DisparityMap
-from mvcodec.layers.dils import average_px, runs, split, split_levels
-from mvcodec.layers.table import LAYER_SPLITS
+from mvcodec.layers.dils_split import average_px, runs, split, split_levels
+from mvcodec.layers.splits import LAYER_SPLITS
 
 
 def ones(text: str) -> NDArray[np.bool_]:

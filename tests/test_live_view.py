@@ -24,9 +24,9 @@ from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from mcap.reader import make_reader
 from small_arrays import write_array
 
-from mvcodec.cli.live_view import address
+from mvcodec.cli.live_view_option import address
 from mvcodec.container import McapWriter
-from mvcodec.encoder import Encoder
+from mvcodec.encoding.encoder import Encoder
 from mvcodec.errors import SettingError
 from mvcodec.output.live_view import LiveView
 

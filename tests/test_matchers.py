@@ -13,9 +13,9 @@ from mvcodec.layers.refinement import matcher_by_name
 from mvcodec.stereo.adcensus import AdCensus, AdCensusSettings
 from mvcodec.stereo.fixed_window import MEASURES, FixedWindow, FixedWindowSettings
 from mvcodec.stereo.matcher import PairMatcher
+from mvcodec.stereo.matchers import MATCHERS, make_matcher
 from mvcodec.stereo.pairwise import Pairwise, camera_pairs
 from mvcodec.stereo.sgbm import Sgbm, SgbmSettings
-from mvcodec.stereo.table import MATCHERS, make_matcher
 
 GRIDS = [(1, 2), (2, 1), (2, 2), (1, 3), (3, 3)]
 CASES = [  # rho, far, near, range

@@ -13,13 +13,13 @@ from coding import encode, luma_psnr, make_array
 
 from mvcodec.array import Position, Viewpoint
 from mvcodec.container import McapWriter
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.decoding.frame_store import FrameStore
+from mvcodec.decoding.stand_in import fill_absent
 from mvcodec.errors import MvCodecWarning, SettingError
 from mvcodec.frames import DecodedSet, DisparityMap, Picture
-from mvcodec.player.frame_store import FrameStore
 from mvcodec.stream import Packet, TrackKind
-from mvcodec.synthesis.stand_in import fill_absent
-from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
+from mvcodec.synthesis.synthesizers import SYNTHESIZERS, make_synthesizer
 
 ARRAY = make_array()
 LATE: Position = (0, 1)

@@ -12,16 +12,16 @@ from array_files import Broken, break_off, files_in, picture_of
 from numpy.typing import NDArray
 
 from mvcodec.array import Viewpoint
-from mvcodec.capture.pictures import read_picture
-from mvcodec.capture.textures import photograph
+from mvcodec.capture.picture_files import read_picture
 from mvcodec.capture.truth import read_pfm
-from mvcodec.capture.video_file import VideoView
+from mvcodec.capture.video_input import VideoView
 from mvcodec.errors import OutputError, SettingError, StreamClosed
 from mvcodec.frames import Picture
 from mvcodec.output.atomic import replacing, write_bytes
 from mvcodec.output.mosaic import ERROR_GAIN, contact_sheet, error_picture, mosaic
 from mvcodec.output.pictures import viewpoint_name, write_pfm, write_png
 from mvcodec.output.video_file import Mp4Writer
+from mvcodec.scenes.textures import photograph
 
 
 def luma_psnr(a: NDArray[Any], b: NDArray[Any]) -> float:

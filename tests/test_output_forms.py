@@ -11,8 +11,8 @@ from array_files import Broken, break_off, files_in, picture_of
 
 from mvcodec.array import Calibration, CameraArray, Viewpoint
 from mvcodec.capture import open_input
-from mvcodec.capture.pictures import picture_size, read_picture
-from mvcodec.capture.video_file import VideoView
+from mvcodec.capture.picture_files import picture_size, read_picture
+from mvcodec.capture.video_input import VideoView
 from mvcodec.errors import OutputError, SettingError, StreamClosed
 from mvcodec.frames import Picture
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter

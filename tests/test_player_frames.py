@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from player_files import FRAMES, GOP, damage, encode, write_original
 
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.decoding.frame_store import MIN_CACHED, FrameStore
+from mvcodec.decoding.frame_table import read_frame_table
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet
-from mvcodec.player.frame_store import MIN_CACHED, FrameStore
-from mvcodec.player.frame_table import read_frame_table
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from plane_scene import Plane, PlaneScene, grid
 
 from mvcodec.array import Viewpoint
 from mvcodec.frames import DecodedSet, Picture, RenderedView
-from mvcodec.output import stereo
+from mvcodec.output import stereoscopic
 from mvcodec.player import overlays
 from mvcodec.player.looks import LOOKS
 from mvcodec.synthesis.linear import Linear
@@ -89,7 +89,7 @@ def test_difference_is_from_the_nearest_real_camera() -> None:
 
 @given(st.floats(0, 2), st.floats(0, 4), st.floats(0, 9))
 def test_eyes_keep_their_distance_inside_the_array(row: float, col: float, eyes: float) -> None:
-    for place in (stereo.two_eyes, stereo.nine_places):
+    for place in (stereoscopic.two_eyes, stereoscopic.nine_places):
         viewpoints = place(ARRAY, Viewpoint(row, col), eyes)
         for viewpoint in viewpoints:
             ARRAY.check_viewpoint(viewpoint)
@@ -100,16 +100,19 @@ def test_eyes_keep_their_distance_inside_the_array(row: float, col: float, eyes:
 
 def test_one_column_has_no_stereo() -> None:
     column = grid(3, 1, 96, 64, step=2)
-    left, right = stereo.two_eyes(column, Viewpoint(1, 0), 0.5)
+    left, right = stereoscopic.two_eyes(column, Viewpoint(1, 0), 0.5)
     assert left == right == Viewpoint(1, 0)
 
 
 def test_each_eye_sees_its_own_picture_through_the_glasses() -> None:
     black, white = np.zeros((8, 8, 3), np.uint8), np.full((8, 8, 3), 255, np.uint8)
-    left_only, right_only = stereo.anaglyph(white, black)[0, 0], stereo.anaglyph(black, white)[0, 0]
+    left_only, right_only = (
+        stereoscopic.anaglyph(white, black)[0, 0],
+        stereoscopic.anaglyph(black, white)[0, 0],
+    )
     np.testing.assert_allclose(left_only, [255, 0, 0], atol=12)
     np.testing.assert_allclose(right_only, [0, 255, 255], atol=12)
-    np.testing.assert_allclose(stereo.anaglyph(white, white)[0, 0], 255, atol=2)
+    np.testing.assert_allclose(stereoscopic.anaglyph(white, white)[0, 0], 255, atol=2)
 
 
 def test_side_by_side_and_nine_views_lie_in_order() -> None:

@@ -19,7 +19,7 @@ from mvcodec.player.session import PictureRequest
 from mvcodec.synthesis.layered import Layered
 from mvcodec.synthesis.quick import Quick
 from mvcodec.synthesis.synthesizer import Preparing
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 MIDDLE = Viewpoint(0.5, 0.5)
 

@@ -17,12 +17,12 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from mvcodec.array import Viewpoint
 from mvcodec.capture import open_input
 from mvcodec.cli import play
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import MissingExtra
 from mvcodec.evaluation.metrics import psnr, ssim
 from mvcodec.player.access import AccessRules, is_loopback
 from mvcodec.player.messages import MAX_MESSAGE_BYTES
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 pytest_plugins = ("player_fixtures",)
 

@@ -17,19 +17,19 @@ from small_arrays import HEIGHT, WIDTH, picture, write_array
 
 from mvcodec.array import Viewpoint
 from mvcodec.capture import open_input
-from mvcodec.capture.pictures import read_picture
-from mvcodec.decoder import Decoder
+from mvcodec.capture.picture_files import read_picture
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import InputError
 from mvcodec.evaluation.compare import compare
 from mvcodec.evaluation.metrics import luma, psnr
-from mvcodec.evaluation.provenance import ProvenanceMeter
+from mvcodec.evaluation.quality_by_provenance import ProvenanceMeter
 from mvcodec.frames import LayerStack, RenderedView
-from mvcodec.layers.dils import THRESHOLD
+from mvcodec.layers.dils_split import THRESHOLD
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.output.pictures import write_png
-from mvcodec.output.provenance import ProvenanceWriter, write_provenance
+from mvcodec.output.provenance_pictures import ProvenanceWriter, write_provenance
 from mvcodec.synthesis.provenance import LAYERS_TEXT, Provenance, layer_labels, provenance_name, seen_by
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 FRAMES = 2
 VIEWS = [(row, col) for row in range(3) for col in range(3)]

@@ -15,7 +15,7 @@ from mvcodec.frames import FloatMap, Picture
 from mvcodec.kernels import view_quick
 from mvcodec.synthesis.layered import Layered
 from mvcodec.synthesis.quick import Quick
-from mvcodec.synthesis.table import QUICKER, SYNTHESIZERS
+from mvcodec.synthesis.synthesizers import QUICKER, SYNTHESIZERS
 
 Shape = tuple[int, int]
 SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11)]

@@ -17,7 +17,7 @@ from command_line import fails, succeeds
 from damage import chunk_ends
 
 from mvcodec.container import McapReader
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import InputError
 
 COUNT, GOP = 120, 10

@@ -10,12 +10,12 @@ import pytest
 import skimage
 from numpy.typing import NDArray
 
-from mvcodec.capture.lighting import LightBaker, Lighting, LightMaps
-from mvcodec.capture.renderer import LitScene, Optics
-from mvcodec.capture.solids import Rectangle, Shape, Sphere, Surface, box, floor, rectangle, rolled, spun
-from mvcodec.capture.textures import PHOTOGRAPHS, photograph, pyramids
 from mvcodec.kernels.illumination import Rays, Solids, find_blocked, gather_light
 from mvcodec.kernels.texture import filtered, light_at
+from mvcodec.scenes.lighting import LightBaker, Lighting, LightMaps
+from mvcodec.scenes.renderer import LitScene, Optics
+from mvcodec.scenes.solids import Rectangle, Shape, Sphere, Surface, box, floor, rectangle, rolled, spun
+from mvcodec.scenes.textures import PHOTOGRAPHS, photograph, pyramids
 
 Vectors = NDArray[np.float64]
 OPTICS = Optics(60, 40, 60.0)
@@ -267,7 +267,7 @@ def test_light_is_that_of_the_free_rays() -> None:
 
 def test_directions_are_turned_about_the_normal() -> None:
     """Rays to all sides of a surface, and a plate before one half of them."""
-    from mvcodec.capture.lighting import _rays
+    from mvcodec.scenes.lighting import _rays
 
     rays = _rays(Lighting((0.0, -2.0, 0.0), (1.0, 1.0), (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), samples=400))
     assert rays.around[:, 2].mean() == pytest.approx(2 / 3, abs=0.01)  # of the cosine's density

@@ -17,13 +17,13 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from mcap.reader import make_reader
 
 from mvcodec.array import Calibration
+from mvcodec.conformance.recovery import Incomplete, Recovered, recover
+from mvcodec.conformance.validation import validate
 from mvcodec.container import McapReader, McapWriter
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.container.limits import DEFAULT_LIMITS
-from mvcodec.encoder import Encoder
+from mvcodec.encoding.encoder import Encoder
 from mvcodec.errors import SettingError, StreamError
-from mvcodec.evaluation.validation import validate
-from mvcodec.output.recovery import Incomplete, Recovered, recover
 from mvcodec.stream import Packet, TrackKind
 
 ARRAY = replace(make_array(48, 32, rows=1), calibration=Calibration(100.0, 100.0, 23.5, 15.5, 0.05))

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from coding import encode, frame_set, make_array
 
-from mvcodec.decoder import Decoder
+from mvcodec.conformance.unit_rules import UNIT_RULES
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import MissingReference, StreamError
 from mvcodec.stream import Packet, TrackKind
 from mvcodec.video.av1_syntax import Av1References
 from mvcodec.video.bits import NalError
 from mvcodec.video.codec import RateControl, VideoSettings
+from mvcodec.video.codecs import CODECS, find_codec
 from mvcodec.video.colour import to_planes
 from mvcodec.video.hevc_syntax import HevcReferences
-from mvcodec.video.table import CODECS, find_codec
-from mvcodec.video.unit_rules import UNIT_RULES
 
 ARRAY = make_array(64, 48, rows=1, cols=2, fps=20.0)
 COUNT, GOP = 16, 8

@@ -13,11 +13,11 @@ from coding import RANGE_PX, RampMatcher, config, encode, frame_set, make_array,
 from study_runs import study_run
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.encoder import Encoder
+from mvcodec.encoding.encoder import Encoder
 from mvcodec.errors import OutputError
 from mvcodec.evaluation.remembered import MapSpool, Remembered
 from mvcodec.frames import DisparityMap, Picture
-from mvcodec.stereo.table import MATCHERS
+from mvcodec.stereo.matchers import MATCHERS
 
 SECONDS = 0.05
 

@@ -13,11 +13,11 @@ from types import ModuleType
 
 import pytest
 from small_arrays import write_array
+from thesis import grid, maps, pairs, reasons
+from thesis.figures import LayerFigures, ViewFigures
+from thesis.lines import BETAS
 
 from mvcodec.evaluation.regions import BadPixels
-from mvcodec.evaluation.thesis import grid, maps, pairs, reasons
-from mvcodec.evaluation.thesis.figures import LayerFigures, ViewFigures
-from mvcodec.evaluation.thesis.lines import BETAS
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT.parent / "shared" / "data"

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from mvcodec.array import Position, Viewpoint
 from mvcodec.capture import open_input
-from mvcodec.capture.scene import SCENES, Scene, SceneSettings, make_scene
-from mvcodec.capture.textures import photograph
 from mvcodec.capture.truth import read_pfm
 from mvcodec.errors import OutputError, SettingError
 from mvcodec.frames import FloatMap, Picture
 from mvcodec.output.sample import write_sample
+from mvcodec.scenes.scene import SCENES, Scene, SceneSettings, make_scene
+from mvcodec.scenes.textures import photograph
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZE = (320, 180)

@@ -14,7 +14,7 @@ from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, DisparityMap, RenderedView
 from mvcodec.synthesis.synthesizer import Synthesizer
-from mvcodec.synthesis.table import SYNTHESIZERS, make_synthesizer
+from mvcodec.synthesis.synthesizers import SYNTHESIZERS, make_synthesizer
 
 
 @pytest.fixture(params=SYNTHESIZERS)
@@ -151,5 +151,5 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
 
 def test_the_table_costs_no_compiler() -> None:
     """Numba takes half a second to import: the names must be there without it."""
-    program = "import sys, mvcodec.synthesis.table; sys.exit('numba' in sys.modules)"
+    program = "import sys, mvcodec.synthesis.synthesizers; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

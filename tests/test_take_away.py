@@ -15,8 +15,8 @@ from PIL import Image
 from plane_scene import Plane, PlaneScene, grid
 
 from mvcodec.array import CameraArray, Viewpoint
-from mvcodec.capture.pictures import read_picture
-from mvcodec.capture.video_file import VideoView
+from mvcodec.capture.picture_files import read_picture
+from mvcodec.capture.video_input import VideoView
 from mvcodec.errors import InputError, OutputError, SettingError
 from mvcodec.frames import Picture, RenderedView
 from mvcodec.output import picture_file

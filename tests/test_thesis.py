@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from small_arrays import photograph, picture, write_array
+from thesis import grid, maps, pairs
+from thesis.figures import LayerFigures, ThesisTables, ViewFigures
+from thesis.lines import BETAS, Line
 
 from mvcodec.errors import InputError
-from mvcodec.evaluation.thesis import grid, maps, pairs
-from mvcodec.evaluation.thesis.figures import LayerFigures, ThesisTables, ViewFigures
-from mvcodec.evaluation.thesis.lines import BETAS, Line
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.stereo.fixed_window import FixedWindow

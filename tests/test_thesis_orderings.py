@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from thesis import grid, maps, pairs, reasons
+from thesis.figures import LayerFigures, ViewFigures
+from thesis.lines import BETAS, LINES, SPANS
+from thesis.orderings import find_orderings
+
 from mvcodec.evaluation.regions import BadPixels
-from mvcodec.evaluation.thesis import grid, maps, pairs, reasons
-from mvcodec.evaluation.thesis.figures import LayerFigures, ViewFigures
-from mvcodec.evaluation.thesis.lines import BETAS, LINES, SPANS
-from mvcodec.evaluation.thesis.orderings import find_orderings
 
 
 def figures(similarity: float) -> ViewFigures:

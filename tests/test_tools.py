@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from small_arrays import write_array
 
-from mvcodec.capture.pictures import read_picture
+from mvcodec.capture.picture_files import read_picture
 from mvcodec.container import read_info
 
 ROOT = Path(__file__).parents[1]

@@ -15,8 +15,8 @@ from coding import encode, make_array
 from command_line import mvcodec, succeeds
 from damage import chunk_ends, small_file
 
+from mvcodec.conformance.validation import validate
 from mvcodec.errors import InputError
-from mvcodec.evaluation.validation import validate
 
 CONFORMANCE = sorted((Path(__file__).parent / "conformance").glob("*.mcap"))
 BIN = Path(sys.executable).parent

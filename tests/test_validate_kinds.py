@@ -24,10 +24,10 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from mvcodec.array import Viewpoint
+from mvcodec.conformance.validation import FileKind, Validation, examine
 from mvcodec.container.point_writer import PointWriter
 from mvcodec.container.video_topics import VideoTopicsWriter
-from mvcodec.encoder import Encoder
-from mvcodec.evaluation.validation import FileKind, Validation, examine
+from mvcodec.encoding.encoder import Encoder
 from mvcodec.output.forms import OutputPlan
 from mvcodec.output.mcap_views import McapViews
 from mvcodec.stream import TrackKind

@@ -18,9 +18,9 @@ from mvcodec.errors import SettingError, StreamError
 from mvcodec.stream import TrackKind
 from mvcodec.video import annexb
 from mvcodec.video.codec import PRESETS, Codec, CodedPicture, RateControl, VideoSettings
+from mvcodec.video.codecs import CODECS, find_codec
 from mvcodec.video.colour import grey_planes, to_picture, to_planes
 from mvcodec.video.disparity_code import dequantise, quantise
-from mvcodec.video.table import CODECS, find_codec
 
 WIDTH, HEIGHT = 128, 96
 

@@ -11,10 +11,10 @@ from array_files import picture_of, save_planes
 from numpy.typing import NDArray
 
 from mvcodec.capture import open_input
-from mvcodec.capture.textures import photograph as photograph_of
-from mvcodec.capture.video_file import VideoView
+from mvcodec.capture.video_input import VideoView
 from mvcodec.errors import InputError, SettingError
 from mvcodec.output.video_file import Mp4Writer
+from mvcodec.scenes.textures import photograph as photograph_of
 
 # ITU-R BT.709 and BT.601: shares of red and blue in luma.
 LUMA_SHARES = {1: (0.2126, 0.0722), 5: (0.299, 0.114), 6: (0.299, 0.114)}

@@ -25,13 +25,13 @@ from array_sets import add_options, find_sets, match_corners, run, say, scored_v
 
 from mvcodec.array import Viewpoint
 from mvcodec.capture import ArraySource, open_input
-from mvcodec.capture.scene import SceneSettings
 from mvcodec.errors import InputError, SettingError
 from mvcodec.evaluation.quality import QualityMeter
 from mvcodec.layers.refinement import matcher_by_name
 from mvcodec.output.sample import write_sample
+from mvcodec.scenes.scene import SceneSettings
 from mvcodec.synthesis.synthesizer import Synthesizer
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 FRAMES = 8
 """As many as speed is measured on."""

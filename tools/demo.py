@@ -23,12 +23,11 @@ from pathlib import Path
 
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture import ArraySource, open_input
-from mvcodec.capture.scene import DEFAULT_SCENE, make_scene
 from mvcodec.cli.main import main as mvcodec
 from mvcodec.cli.progress import progress
 from mvcodec.container import StreamInfo, read_info
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import EncoderConfig, default_gop
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.encoding.encoder import EncoderConfig, default_gop
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.evaluation.anchors import CodedArray, code_array
 from mvcodec.evaluation.metrics import psnr
@@ -38,8 +37,9 @@ from mvcodec.output.mosaic import contact_sheet, error_picture, mosaic
 from mvcodec.output.pictures import write_png
 from mvcodec.output.sample import write_sample
 from mvcodec.output.video_file import Mp4Writer
+from mvcodec.scenes.scene import DEFAULT_SCENE, make_scene
 from mvcodec.synthesis.synthesizer import Synthesizer
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codec import RateControl
 
 THREADS = 2

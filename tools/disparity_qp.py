@@ -23,9 +23,9 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from map_codings import Material, arguments_of, code, run, whole_numbers
 
-from mvcodec.encoder import EncoderConfig
+from mvcodec.encoding.encoder import EncoderConfig
 from mvcodec.stream import DISPARITY_SCALES
-from mvcodec.video.table import find_codec
+from mvcodec.video.codecs import find_codec
 
 QPS, OFFSETS = "22,27,32,37", "-6,-3,0,3,6"
 

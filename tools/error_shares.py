@@ -27,7 +27,7 @@ from mvcodec.array import Viewpoint
 from mvcodec.capture import ArraySource
 from mvcodec.evaluation.error_regions import REGIONS, ErrorMeter, ErrorShares
 from mvcodec.synthesis.synthesizer import Synthesizer
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 
 def measure_errors(source: ArraySource, matcher: str, synthesizer: Synthesizer) -> ErrorShares:

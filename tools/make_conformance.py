@@ -24,11 +24,11 @@ from skimage import data
 
 from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.container import McapReader, McapWriter
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stream import TrackKind
+from mvcodec.video.codecs import find_codec
 from mvcodec.video.map_size import small_size
-from mvcodec.video.table import find_codec
 
 RANGE_PX = (-3.0, 9.5)
 

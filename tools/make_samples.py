@@ -12,9 +12,9 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from mvcodec.array import Viewpoint
-from mvcodec.capture.scene import SceneSettings, make_scene
 from mvcodec.output.array_folder import VIDEO_PATTERN, ArrayFacts, write_manifest
 from mvcodec.output.video_file import Mp4Writer
+from mvcodec.scenes.scene import SceneSettings, make_scene
 
 ROWS, COLS, FRAMES, SIZE = 2, 2, 12, (640, 360)
 CRF = 8.0

@@ -19,16 +19,16 @@ from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture import open_input, resolve_frames
 from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, disparity_range, join_negative_values
 from mvcodec.cli.coding_options import find_range
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder, EncoderConfig, find_matcher
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.encoding.encoder import Encoder, EncoderConfig, find_matcher
 from mvcodec.errors import MvCodecError
 from mvcodec.evaluation.metrics import luma, psnr
 from mvcodec.evaluation.remembered import MapSpool, Remembered
 from mvcodec.frames import DecodedSet, FrameSet
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stream import DISPARITY_CAMERAS, TrackKind
-from mvcodec.synthesis.table import make_synthesizer
-from mvcodec.video.table import CODECS
+from mvcodec.synthesis.synthesizers import make_synthesizer
+from mvcodec.video.codecs import CODECS
 
 
 @dataclass(frozen=True, slots=True, eq=False)

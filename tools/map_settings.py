@@ -22,7 +22,7 @@ from dataclasses import asdict, dataclass, replace
 
 from map_codings import Material, Outcome, arguments_of, code, run
 
-from mvcodec.encoder import EncoderConfig
+from mvcodec.encoding.encoder import EncoderConfig
 from mvcodec.errors import SettingError
 from mvcodec.stream import TrackKind
 from mvcodec.video.h264 import X264_PARAMS

@@ -18,16 +18,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TypeVar
 
+from thesis import grid, maps, pairs
+from thesis.figures import Step, ThesisTables
+from thesis.grid import GridRow, GridTable
+from thesis.lines import BETAS, SPANS
+from thesis.maps import THRESHOLDS_PX, MapTable
+from thesis.orderings import find_orderings
+from thesis.pairs import PairTable
+from thesis.reasons import Ordering
+
 from mvcodec.cli.progress import progress
 from mvcodec.errors import MvCodecError, SettingError
-from mvcodec.evaluation.thesis import grid, maps, pairs
-from mvcodec.evaluation.thesis.figures import Step, ThesisTables
-from mvcodec.evaluation.thesis.grid import GridRow, GridTable
-from mvcodec.evaluation.thesis.lines import BETAS, SPANS
-from mvcodec.evaluation.thesis.maps import THRESHOLDS_PX, MapTable
-from mvcodec.evaluation.thesis.orderings import find_orderings
-from mvcodec.evaluation.thesis.pairs import PairTable
-from mvcodec.evaluation.thesis.reasons import Ordering
 
 TABLES = Path(__file__).resolve().parents[2] / "shared" / "reference" / "thesis_tables.json"
 CHAPTERS = (4, 5, 6)

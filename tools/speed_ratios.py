@@ -24,18 +24,18 @@ from av.video.codeccontext import VideoCodecContext
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture import ArraySource
 from mvcodec.container.writer import McapWriter
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder, EncoderConfig, default_gop
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.encoding.encoder import Encoder, EncoderConfig, default_gop
 from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture
 from mvcodec.layers.refinement import matcher_by_name
 from mvcodec.stereo.disparity_range import estimate_range
 from mvcodec.stream import Packet, TrackKind
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codec import Planes, VideoSettings
+from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import even_size, grey_planes, to_planes
 from mvcodec.video.disparity_code import quantise
 from mvcodec.video.map_size import MEDIANS, coded_size, to_coded
-from mvcodec.video.table import find_codec
 
 RATIOS = {
     "view": "one virtual view / one bicubic cv2.remap",

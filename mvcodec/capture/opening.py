@@ -11,7 +11,7 @@ from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.capture.manifest import MANIFEST_NAME, Manifest, ViewFiles, read_manifest
 from mvcodec.capture.selection import select_real
 from mvcodec.capture.source import ArraySource
-from mvcodec.capture.video_file import VideoView
+from mvcodec.capture.video_input import VideoView
 from mvcodec.capture.view_array import PictureView, ViewArray, ViewReader, check_views
 from mvcodec.errors import InputError, SettingError
 

@@ -13,8 +13,8 @@ from av.video.codeccontext import VideoCodecContext
 from av.video.reformatter import VideoReformatter
 from PIL import Image, UnidentifiedImageError
 
-from mvcodec.capture.video_file import frame_to_rgb
-from mvcodec.container.recording import RecordedPicture
+from mvcodec.capture.video_input import frame_to_rgb
+from mvcodec.container.recorded_pictures import RecordedPicture
 from mvcodec.errors import InputError
 from mvcodec.frames import Picture
 

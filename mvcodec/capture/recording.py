@@ -16,7 +16,7 @@ from mvcodec.capture.recorded_calibration import NotRectified, array_calibration
 from mvcodec.capture.selection import select_real
 from mvcodec.container.chunks import OnDamage
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
-from mvcodec.container.recording import RecordedPicture, RecordingReader
+from mvcodec.container.recorded_pictures import RecordedPicture, RecordingReader
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet, Picture
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mvcodec.capture.pictures import read_grey
+from mvcodec.capture.picture_files import read_grey
 from mvcodec.errors import InputError
 from mvcodec.frames import DisparityMap, FloatMap
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.capture.pictures import picture_size, read_picture, wrong_size
+from mvcodec.capture.picture_files import picture_size, read_picture, wrong_size
 from mvcodec.capture.source import resolve_frames
 from mvcodec.capture.truth import TruthFiles
 from mvcodec.errors import InputError, SettingError

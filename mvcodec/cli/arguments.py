@@ -124,7 +124,7 @@ def disparity_qp(text: str) -> int | None:
 
 def add_synthesizer(parser: argparse.ArgumentParser) -> None:
     """``--synthesizer NAME``."""
-    from mvcodec.synthesis.table import SYNTHESIZERS
+    from mvcodec.synthesis.synthesizers import SYNTHESIZERS
 
     parser.add_argument(
         "--synthesizer",

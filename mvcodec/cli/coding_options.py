@@ -9,13 +9,13 @@ from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource
 from mvcodec.cli.arguments import disparity_qp, disparity_range, pair_of_sizes
 from mvcodec.cli.paths import local_path
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.frames import FrameSet
 from mvcodec.layers.refinement import matcher_choices
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
 from mvcodec.stream import DISPARITY_CAMERAS
 from mvcodec.video.codec import PRESETS
-from mvcodec.video.table import CODECS
+from mvcodec.video.codecs import CODECS
 
 
 def add_input(parser: argparse.ArgumentParser, what: str) -> None:

@@ -13,8 +13,8 @@ from mvcodec.capture import open_input, resolve_frames
 from mvcodec.cli.arguments import add_frames, add_output_options
 from mvcodec.cli.progress import progress
 from mvcodec.evaluation.compare import common_frame_count, compare
-from mvcodec.evaluation.provenance import ProvenanceQuality
 from mvcodec.evaluation.quality import Comparison
+from mvcodec.evaluation.quality_by_provenance import ProvenanceQuality
 from mvcodec.frames import Picture
 from mvcodec.output.pictures import write_png
 from mvcodec.stream import view_name

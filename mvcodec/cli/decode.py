@@ -23,15 +23,15 @@ from mvcodec.container import McapReader
 from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.follow import FollowedFile
 from mvcodec.container.remote import is_url
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import OutputError, SettingError, StreamError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.output.forms import FORMS, OutputPlan, open_form
 from mvcodec.output.mcap_views import McapViews
-from mvcodec.output.provenance import ProvenanceWriter
+from mvcodec.output.provenance_pictures import ProvenanceWriter
 from mvcodec.stream import StreamHeader
 from mvcodec.synthesis.synthesizer import Synthesizer
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 MOSAIC = "mosaic"
 MOSAIC_SUFFIXES = (".mp4", ".png")

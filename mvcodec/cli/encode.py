@@ -25,7 +25,7 @@ from mvcodec.cli.encode_stream import (
 )
 from mvcodec.cli.info import document, summary
 from mvcodec.cli.interrupt import deferred_interrupt
-from mvcodec.cli.live_view import add_live_view, live_view
+from mvcodec.cli.live_view_option import add_live_view, live_view
 from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_chunk_ms
@@ -33,7 +33,7 @@ from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD
 from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.container import McapWriter, read_info
 from mvcodec.depth import require_calibration
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.output.live_view import LiveView
 

@@ -15,7 +15,7 @@ from mvcodec.array import CameraArray
 from mvcodec.capture.manifest import read_calibration
 from mvcodec.capture.recording import Recording, RecordingSettings
 from mvcodec.cli.interrupt import deferred_interrupt
-from mvcodec.cli.live_view import live_view
+from mvcodec.cli.live_view_option import live_view
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_on_error
 from mvcodec.cli.standard_streams import INPUT_NAME, STANDARD, standard_input, standard_output
@@ -23,10 +23,10 @@ from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.container import McapWriter
 from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.declared import DROPPED_KEY
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.live import LiveEncoding, WhenBehind
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import FrameSet
-from mvcodec.live import LiveEncoding, WhenBehind
 from mvcodec.output.live_view import LiveView
 
 SUFFIX = ".mcap"

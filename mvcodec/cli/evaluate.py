@@ -16,8 +16,8 @@ from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesize
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.progress import progress
 from mvcodec.errors import MissingExtra, MvCodecWarning, OutputError
-from mvcodec.synthesis.table import make_synthesizer
-from mvcodec.video.table import CODECS
+from mvcodec.synthesis.synthesizers import make_synthesizer
+from mvcodec.video.codecs import CODECS
 
 if TYPE_CHECKING:
     from mvcodec.evaluation.study import Study

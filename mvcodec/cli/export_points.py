@@ -12,7 +12,7 @@ from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.container.point_writer import PointWriter
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.depth import points_of, require_calibration
 from mvcodec.errors import SettingError
 from mvcodec.output.ply import write_ply

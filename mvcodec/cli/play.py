@@ -12,7 +12,7 @@ from mvcodec.cli.arguments import add_synthesizer
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.errors import MissingExtra
-from mvcodec.synthesis.table import QUICKER, make_synthesizer
+from mvcodec.synthesis.synthesizers import QUICKER, make_synthesizer
 
 EXTRA = "play"
 PACKAGES = ("starlette", "uvicorn", "websockets")

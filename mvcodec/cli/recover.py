@@ -8,9 +8,9 @@ import warnings
 from mvcodec.cli.info import count
 from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.safety import add_limits
+from mvcodec.conformance.recovery import recover
 from mvcodec.container.limits import Limits
 from mvcodec.errors import MvCodecWarning, SettingError, StreamError
-from mvcodec.output.recovery import recover
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -17,14 +17,14 @@ from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.container import McapReader
 from mvcodec.container.limits import Limits
-from mvcodec.decoder import Decoder
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import SettingError, StreamError
 from mvcodec.frames import Picture
 from mvcodec.output.light_field import quilt_path
 from mvcodec.output.picture_file import STILL_SUFFIX, WRITERS, find_writer
 from mvcodec.output.styles import STYLES, ShotSettings, take
 from mvcodec.output.view_path import FILE_SUFFIX, SHAPES, read_waypoints, walk_shape, walk_waypoints
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 QUILT = "quilt"
 FROZEN_SECONDS = 2

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from mvcodec.capture.scene import DEFAULT_SCENE, SCENES, SceneSettings, make_scene
 from mvcodec.cli.arguments import add_output_options, pair_of_sizes, positive_int
 from mvcodec.cli.info import count
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
 from mvcodec.output.sample import write_sample
+from mvcodec.scenes.scene import DEFAULT_SCENE, SCENES, SceneSettings, make_scene
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

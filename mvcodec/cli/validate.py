@@ -9,10 +9,10 @@ from typing import Any
 from mvcodec.cli.info import count
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.safety import add_limits
-from mvcodec.container.finding import Finding, Severity
+from mvcodec.conformance.finding import Finding, Severity
+from mvcodec.conformance.validation import FileKind, examine
 from mvcodec.container.limits import Limits
 from mvcodec.errors import MvCodecError
-from mvcodec.evaluation.validation import FileKind, examine
 from mvcodec.stream import HEADER_TRACK
 
 _KINDS: dict[FileKind | None, str] = {

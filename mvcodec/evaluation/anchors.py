@@ -14,8 +14,8 @@ from mvcodec.evaluation.stopwatch import Stopwatch
 from mvcodec.frames import Picture
 from mvcodec.stream import TrackKind
 from mvcodec.video.codec import Codec, Planes, RateControl, VideoSettings
+from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import even_size, to_picture, to_planes
-from mvcodec.video.table import find_codec
 
 THREADS = 2
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from mvcodec.array import Position, Viewpoint
 from mvcodec.capture import ArraySource
 from mvcodec.container import McapWriter, read_info
-from mvcodec.decoder import Decoder
-from mvcodec.encoder import Encoder, EncoderConfig
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.errors import InputError
 from mvcodec.evaluation.points import BitsSplit, CurvePoint
 from mvcodec.evaluation.quality import Comparison, QualityMeter

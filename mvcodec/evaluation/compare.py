@@ -16,8 +16,8 @@ from mvcodec.errors import InputError, MvCodecWarning
 from mvcodec.evaluation.flicker import FlickerMeter
 from mvcodec.evaluation.immersive import iv_psnr
 from mvcodec.evaluation.metrics import ssim_picture
-from mvcodec.evaluation.provenance import ProvenanceMeter, read_seen_by
 from mvcodec.evaluation.quality import Comparison, QualityMeter, ViewQuality
+from mvcodec.evaluation.quality_by_provenance import ProvenanceMeter, read_seen_by
 from mvcodec.frames import FrameSet, Picture
 
 THREADS = 2

@@ -17,7 +17,18 @@ from mvcodec.video.pyav import library_versions
 PACKAGE = Path(mvcodec.__file__).parent
 
 CHAIN = (
-    *("*.py", "capture", "stereo", "layers", "video", "container", "synthesis", "kernels"),
+    *(
+        "*.py",
+        "capture",
+        "stereo",
+        "layers",
+        "encoding",
+        "video",
+        "container",
+        "decoding",
+        "synthesis",
+        "kernels",
+    ),
     *(f"evaluation/{name}.py" for name in ("chain", "metrics", "quality", "remembered")),
 )
 """The rooms, and files of this one, that a point of mvcodec's own curve depends on."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from mvcodec.array import Position
 from mvcodec.evaluation.metrics import psnr, ssim
-from mvcodec.evaluation.provenance import ProvenanceQuality
+from mvcodec.evaluation.quality_by_provenance import ProvenanceQuality
 from mvcodec.frames import Picture
 
 METRICS = ("psnr_y", "ssim", "temporal_psnr_y", "iv_psnr")

@@ -24,7 +24,7 @@ from mvcodec.evaluation.page import Shown, make_page
 from mvcodec.evaluation.points import CurvePoint
 from mvcodec.evaluation.rate_figure import rd_figure
 from mvcodec.evaluation.study import OURS, StudyRun
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 RD_TEXT = (
     "Luma PSNR as the mean over all pictures of the class. Anchors code every view of the array and are"

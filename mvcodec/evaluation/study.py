@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from mvcodec.capture import ArraySource
-from mvcodec.encoder import EncoderConfig, default_gop, find_matcher
+from mvcodec.encoding.encoder import EncoderConfig, default_gop, find_matcher
 from mvcodec.errors import OutputError, SettingError
 from mvcodec.evaluation.anchors import ANCHORS, SIMULCAST, Anchor, code_array, sequence_settings
 from mvcodec.evaluation.chain import measure_chain
@@ -24,10 +24,10 @@ from mvcodec.evaluation.fingerprint import (
 )
 from mvcodec.evaluation.points import BitsSplit, CurvePoint, PointStore
 from mvcodec.evaluation.remembered import MapSpool, Remembered
-from mvcodec.synthesis.table import make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codec import RateControl
+from mvcodec.video.codecs import CODECS, find_codec
 from mvcodec.video.pyav import library_versions
-from mvcodec.video.table import CODECS, find_codec
 
 OURS = "mvcodec"
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
-from mvcodec.layers.dils import runs
+from mvcodec.layers.dils_split import runs
 from mvcodec.layers.segments import Segments, split_picture
 
 _MEDIAN_SIZE = 5

@@ -15,9 +15,9 @@ import numpy as np
 
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, Mask, Picture
-from mvcodec.layers.dils import THRESHOLD, average_px
+from mvcodec.layers.dils_split import THRESHOLD, average_px
 from mvcodec.layers.segments import edge_map
-from mvcodec.layers.table import LAYER_SPLITS
+from mvcodec.layers.splits import LAYER_SPLITS
 from mvcodec.stereo.consistency import fill_from_farther
 
 

@@ -14,8 +14,8 @@ from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.layers import dlr, dlr_thesis
 from mvcodec.stereo.matcher import Matcher
+from mvcodec.stereo.matchers import MATCHERS, make_matcher
 from mvcodec.stereo.pairwise import transposed
-from mvcodec.stereo.table import MATCHERS, make_matcher
 
 _Pixel = TypeVar("_Pixel", bound=np.generic)
 

@@ -13,8 +13,8 @@ from mvcodec.frames import Picture
 from mvcodec.output.forms import OutputPlan
 from mvcodec.stream import TrackKind
 from mvcodec.video.codec import CodedPicture, RateControl, VideoEncoder, VideoSettings
+from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import even_size, to_planes
-from mvcodec.video.table import find_codec
 
 CODEC = "h264"
 CRF = 18.0

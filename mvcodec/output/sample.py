@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from mvcodec.array import Position, Viewpoint
-from mvcodec.capture.scene import DEFAULT_SCENE, Scene, SceneSettings, make_scene
 from mvcodec.frames import FloatMap, Picture
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
+from mvcodec.scenes.scene import DEFAULT_SCENE, Scene, SceneSettings, make_scene
 
 _RENDERERS = 2
 

@@ -16,7 +16,7 @@ import numpy as np
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
-from mvcodec.output import light_field, stereo
+from mvcodec.output import light_field, stereoscopic
 from mvcodec.output.mosaic import mosaic
 from mvcodec.synthesis.synthesizer import Synthesizer
 
@@ -116,7 +116,7 @@ def _side_by_side(settings: ShotSettings) -> Shot:
 
 
 def _anaglyph(settings: ShotSettings) -> Shot:
-    return _two_eyes(settings, "anaglyph", stereo.anaglyph)
+    return _two_eyes(settings, "anaglyph", stereoscopic.anaglyph)
 
 
 def _two_eyes(settings: ShotSettings, style: str, join: Callable[[Picture, Picture], Picture]) -> Shot:
@@ -124,7 +124,7 @@ def _two_eyes(settings: ShotSettings, style: str, join: Callable[[Picture, Pictu
     _want_columns(settings, style)
 
     def places(viewpoint: Viewpoint) -> tuple[Viewpoint, ...]:
-        return stereo.two_eyes(settings.array, viewpoint, settings.eye_steps)
+        return stereoscopic.two_eyes(settings.array, viewpoint, settings.eye_steps)
 
     return _converging(settings, Shot(places, lambda _, views: join(next(views).pixels, next(views).pixels)))
 
@@ -135,8 +135,8 @@ def _mosaic(settings: ShotSettings) -> Shot:
         return _converging(
             settings,
             Shot(
-                lambda viewpoint: stereo.nine_places(array, viewpoint, settings.eye_steps),
-                lambda _, views: stereo.nine([view.pixels for view in views]),
+                lambda viewpoint: stereoscopic.nine_places(array, viewpoint, settings.eye_steps),
+                lambda _, views: stereoscopic.nine([view.pixels for view in views]),
             ),
         )
     everywhere = array.viewpoints(*grid)

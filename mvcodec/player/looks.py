@@ -13,7 +13,7 @@ import numpy as np
 
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.frames import DecodedSet, Picture, RenderedView
-from mvcodec.output import stereo
+from mvcodec.output import stereoscopic
 from mvcodec.player import overlays
 
 Legend = dict[str, Any]
@@ -48,7 +48,7 @@ def _plain(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture
 
 
 def _anaglyph(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, Legend]:
-    return stereo.anaglyph(views[0].pixels, views[1].pixels), _eyes(views)
+    return stereoscopic.anaglyph(views[0].pixels, views[1].pixels), _eyes(views)
 
 
 def _side_by_side(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, Legend]:
@@ -56,7 +56,7 @@ def _side_by_side(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[
 
 
 def _mosaic(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, Legend]:
-    return stereo.nine([view.pixels for view in views]), _eyes(views)
+    return stereoscopic.nine([view.pixels for view in views]), _eyes(views)
 
 
 def _eyes(views: Sequence[RenderedView]) -> Legend:
@@ -75,7 +75,7 @@ LOOKS: dict[str, Look] = {
     "layers": Look(_one, overlays.layers),
     "provenance": Look(_one, overlays.provenance),
     "difference": Look(_one, overlays.difference),
-    "anaglyph": Look(stereo.two_eyes, _anaglyph, stereo=True),
-    "side-by-side": Look(stereo.two_eyes, _side_by_side, stereo=True),
-    "mosaic": Look(stereo.nine_places, _mosaic, stereo=True),
+    "anaglyph": Look(stereoscopic.two_eyes, _anaglyph, stereo=True),
+    "side-by-side": Look(stereoscopic.two_eyes, _side_by_side, stereo=True),
+    "mosaic": Look(stereoscopic.nine_places, _mosaic, stereo=True),
 }

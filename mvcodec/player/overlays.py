@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.frames import DecodedSet, DisparityMap, Picture, RenderedView
-from mvcodec.layers.dils import split_levels
+from mvcodec.layers.dils_split import split_levels
 
 DIFFERENCE_GAIN = 4
 SCALE_COLOURS = 17

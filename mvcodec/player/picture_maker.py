@@ -15,14 +15,14 @@ import cv2
 
 from mvcodec.array import Viewpoint
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.decoding.frame_store import Damage, FrameStore
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.player.draft import QUICKER, SMALLER, Level, in_full_px, shrink
-from mvcodec.player.frame_store import Damage, FrameStore
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.originals import Originals
 from mvcodec.player.session import PictureRequest
-from mvcodec.player.synthesizers import SynthesizerPool
+from mvcodec.player.synthesizer_pool import SynthesizerPool
 from mvcodec.synthesis.synthesizer import Preparing, Synthesizer
 
 WORKERS = 2

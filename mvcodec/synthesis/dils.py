@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from mvcodec.array import Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, LayerStack, RenderedView
-from mvcodec.layers.dils import THRESHOLD, average_px
-from mvcodec.layers.table import LAYER_SPLITS
+from mvcodec.layers.dils_split import THRESHOLD, average_px
+from mvcodec.layers.splits import LAYER_SPLITS
 from mvcodec.stereo.matcher import PairMatcher
 from mvcodec.synthesis import mlvs
 from mvcodec.synthesis.mlvs import Route, View

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.frames import DisparityMap, LayerStack, Picture, RenderedView
-from mvcodec.layers.dils import split_levels
+from mvcodec.layers.dils_split import split_levels
 
 PROVENANCE_SUFFIX = ".provenance.png"
 LAYERS_TEXT = "layers_px"

@@ -35,7 +35,7 @@ import math
 from dataclasses import dataclass
 
 from mvcodec.array import CameraArray
-from mvcodec.video.table import find_codec
+from mvcodec.video.codecs import find_codec
 
 
 @dataclass(frozen=True, slots=True)

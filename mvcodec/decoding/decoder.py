@@ -1,0 +1,292 @@
+"""Packets in, decoded sets out; see FORMAT.md."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import BinaryIO, Literal, get_args
+
+from mvcodec.array import Position
+from mvcodec.closing import Closing
+from mvcodec.container import McapReader
+from mvcodec.container.assembly import Assembler, PacketSet
+from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.decoding.derived_maps import derive_map
+from mvcodec.decoding.stand_in import fill_absent
+from mvcodec.errors import MissingReference, MvCodecWarning, SettingError, StreamClosed, StreamError
+from mvcodec.frames import DecodedSet, DisparityMap, Picture
+from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, view_name
+from mvcodec.video.codec import Planes
+from mvcodec.video.codecs import find_codec
+from mvcodec.video.colour import to_picture
+from mvcodec.video.disparity_code import dequantise
+from mvcodec.video.map_size import enlarged, small_size, track_sizes
+from mvcodec.video.track import TrackDecoder
+
+WORKERS = 2
+
+OnError = Literal["skip", "stop"]
+
+
+class Decoder(Closing):
+    """Decodes every track. The last packet of a frame set in, its decoded set out, at once.
+
+    Either `push` packets into ``Decoder()``, or iterate over ``Decoder.open(source)``.
+    Packets that come before the first header are dropped, so that a receiver can join late.
+
+    Missing cameras, frame sets out of order and times given twice are told by an MvCodecWarning;
+    the cameras that are there go on. A camera that missed a picture comes back with a keyframe.
+
+    Args:
+        on_error: at damage, ``stop``: raise StreamError; ``skip``: warn, and go on with the next keyframe.
+        limits: what is more than that is refused.
+    """
+
+    def __init__(self, on_error: OnError = "stop", limits: Limits = DEFAULT_LIMITS) -> None:
+        if on_error not in get_args(OnError):
+            raise SettingError("on_error", on_error, " or ".join(get_args(OnError)))
+        self._on_error, self._limits = on_error, limits
+        self._header: StreamHeader | None = None
+        self._decoders: dict[Track, TrackDecoder] = {}
+        self._absent: frozenset[Position] = frozenset()
+        self._skipping = False
+        self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(WORKERS, "decode")
+        self._reader: McapReader | None = None
+        self._frames: slice | None = None
+        self._name = "stream"
+        self._assembler = Assembler(self._name, _warn)
+
+    @classmethod
+    def open(
+        cls,
+        source: str | Path | BinaryIO,
+        frames: slice | None = None,
+        on_error: OnError = "stop",
+        limits: Limits = DEFAULT_LIMITS,
+    ) -> Decoder:
+        """A decoder of a file, pipe or standard input, to iterate over.
+
+        Args:
+            source: path, URL of a file on a web server, or a binary file that may be a pipe and stays open.
+            frames: Python slice over the frame sets that the file holds (from 0), step 1.
+            on_error, limits: as the constructor's.
+
+        Raises:
+            InputError: the system refuses to open it.
+            StreamError: not an MCAP file, none of ours, or one of a newer format version.
+            SettingError (on iterating): the slice is empty.
+        """
+        decoder = cls(on_error, limits)
+        try:
+            decoder._reader = McapReader.open(source, limits, _warn if on_error == "skip" else None)
+            decoder._name = decoder._reader.name
+            decoder._assembler = Assembler(decoder._name, _warn)
+            decoder._start(decoder._reader.header)
+        except BaseException:
+            decoder.close()
+            raise
+        decoder._frames = frames
+        return decoder
+
+    @property
+    def header(self) -> StreamHeader:
+        """The stream's header.
+
+        Raises:
+            StreamError: no header has come yet.
+        """
+        if self._header is None:
+            raise StreamError(self._name, "no header yet", "a header before anything else")
+        return self._header
+
+    @property
+    def bytes_read(self) -> int:
+        """Bytes taken from the source given to `open` so far."""
+        return 0 if self._reader is None else self._reader.bytes_read
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of the source given to `open`; of a pipe, what was read so far."""
+        return 0 if self._reader is None else self._reader.size
+
+    def __iter__(self) -> Iterator[DecodedSet]:
+        """Decode the source given to `open`. A pipe can be gone through once only.
+
+        Raises:
+            StreamError: damage, with topic and time.
+        """
+        if self._reader is None:
+            raise StreamError(self._name, "a decoder without a source", "Decoder.open(source)")
+        self._start(self._reader.header)
+        start, stop = self._reader.resolve(self._frames)
+        number = before = latest = index = -1
+        for number, packet in self._reader.packets(start, stop):
+            if packet.index != index:
+                before, index = latest, packet.index
+            latest = number
+            for decoded in self.push(packet):
+                # A frame set with missing packets comes out with the first packet of the next.
+                if (number if decoded.index == index else before) >= start:
+                    yield decoded
+        if not self._reader.cut_off and number >= start:
+            yield from self._decode_all(self._assembler.flush())
+        if number < start:
+            raise SettingError(
+                "frames", f"{start}:", f"less than the {number + 1} frame sets of {self._name}"
+            )
+
+    def push(self, packet: Packet) -> list[DecodedSet]:
+        """Take a packet, in stream order; returns the decoded set that it completes, if it does.
+
+        Where packets are missing, the set is complete when the next one begins.
+
+        Raises:
+            StreamError: damage, with topic and time.
+            StreamClosed: after `flush`.
+        """
+        if self._pool is None:
+            raise StreamClosed("the decoder was flushed; it takes no more packets")
+        if packet.track.kind is TrackKind.HEADER:
+            return self._push_header(packet)
+        if self._header is None or self._skipping:
+            return []
+        try:
+            sets = self._assembler.push(packet)
+        except StreamError as error:
+            self._skip(error)
+            return []
+        return self._decode_all(sets)
+
+    def flush(self) -> list[DecodedSet]:
+        """End the stream. Returns what waits for missing packets; `push` is an error from now on."""
+        done = [] if self._pool is None else self._decode_all(self._assembler.flush())
+        self._end()
+        return done
+
+    def close(self) -> None:
+        """End the stream, and close the source if `open` opened it."""
+        self._end()
+        if self._reader is not None:
+            self._reader.close()
+
+    def _end(self) -> None:
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
+
+    def _push_header(self, packet: Packet) -> list[DecodedSet]:
+        """A keyframe begins, where all that was lost is found again."""
+        done = self._decode_all(self._assembler.push(packet))
+        header = StreamHeader.from_json(packet.data, self._name)
+        if header != self._header:
+            self._start(header)
+        self._skipping = False
+        return done
+
+    def _start(self, header: StreamHeader) -> None:
+        """Begin at a keyframe, with fresh decoders."""
+        self._limits.check_header(header, self._name)
+        try:
+            codec = find_codec(header.codec)
+        except SettingError as error:
+            raise StreamError(self._name, f"codec {error.found}", error.expected) from None
+        sizes = track_sizes(header.array.width, header.array.height, header.disparity_scale)
+        self._header = header
+        self._decoders = {track: TrackDecoder(codec, sizes[track.kind]) for track in header.tracks}
+        self._assembler.start(header.tracks)
+        self._absent, self._skipping = frozenset(), False
+
+    def _decode_all(self, sets: list[PacketSet]) -> list[DecodedSet]:
+        done = []
+        for packets in sets:
+            try:
+                done += self._decode(packets)
+            except StreamError as error:
+                self._skip(error)
+        return done
+
+    def _skip(self, error: StreamError) -> None:
+        """Go on with the next keyframe, if that is wanted."""
+        if self._on_error == "stop":
+            raise error
+        _warn(error)
+        self._assembler.drop()
+        self._skipping = True
+
+    def _decode(self, packets: PacketSet) -> list[DecodedSet]:
+        """Decode a frame set; nothing, where no camera with a map is there."""
+        planes, reasons = self._planes(packets)
+        array, span, first = self.header.array, self.header.disparity_range_px, packets.first
+        self._tell_absent(reasons, first)
+        there = [camera for camera in array.real if camera not in reasons]
+        senders = [camera for camera in self.header.map_cameras if camera not in reasons]
+        if not senders:
+            return []
+        assert self._pool is not None
+        textures = [planes[Track(TrackKind.TEXTURE, camera)] for camera in there]
+        maps = [planes[Track(TrackKind.DISPARITY, camera)] for camera in senders]
+        pictures = dict(zip(there, self._pool.map(self._picture, textures), strict=True))
+        found = self._pool.map(self._map, maps, [pictures[camera] for camera in senders])
+        sent = dict(zip(senders, found, strict=True))
+        others = [camera for camera in there if camera not in sent]
+        derived = self._pool.map(partial(derive_map, array, sent, span), others)
+        known = sent | dict(zip(others, derived, strict=True))
+        disparities = {camera: known[camera] for camera in there}
+        if reasons:
+            pictures, disparities = fill_absent(array, pictures, disparities)
+        absent = tuple(camera for camera in array.real if camera in reasons)
+        return [DecodedSet(array, first.index, first.time_ns, pictures, disparities, span, absent)]
+
+    def _planes(self, packets: PacketSet) -> tuple[dict[Track, Planes], dict[Position, StreamError]]:
+        """Decode every track. What is missing is a reason why its camera is absent; damage is raised."""
+        assert self._pool is not None
+        jobs: dict[Track, Future[Planes]] = {
+            track: self._pool.submit(
+                self._decoders[track].push, packet.data, packet.keyframe, self._assembler.label(packet)
+            )
+            for track, packet in packets.packets.items()
+        }
+        wait(jobs.values())
+        planes: dict[Track, Planes] = {}
+        reasons: dict[Position, StreamError] = {}
+        for track in packets.missing:
+            self._decoders[track].lost = True
+            label = self._assembler.label(replace(packets.first, track=track))
+            _note(reasons, track, StreamError(label, "no packet", "one for each track of a frame set"))
+        for track, job in jobs.items():
+            try:
+                planes[track] = job.result()
+            except MissingReference as error:
+                _note(reasons, track, error)
+        return planes, reasons
+
+    def _tell_absent(self, reasons: dict[Position, StreamError], first: Packet) -> None:
+        for camera in sorted(reasons.keys() - self._absent):
+            _warn(reasons[camera], f"; the others go on without camera {view_name(camera)}")
+        for camera in sorted(self._absent - reasons.keys()):
+            text = f"{self._name}: camera {view_name(camera)} is back at {first.time_ns / 1e9:.3f} s"
+            warnings.warn(text, MvCodecWarning, stacklevel=2)
+        self._absent = frozenset(reasons)
+
+    def _picture(self, planes: Planes) -> Picture:
+        array = self.header.array
+        return to_picture(planes, array.width, array.height)
+
+    def _map(self, planes: Planes, picture: Picture) -> DisparityMap:
+        header = self.header
+        width, height = small_size(header.array.width, header.array.height, header.disparity_scale)
+        found = dequantise(planes.y[:height, :width], header.disparity_range_px)
+        return found if header.disparity_scale == 1 else enlarged(found.values_px, picture)
+
+
+def _note(reasons: dict[Position, StreamError], track: Track, error: StreamError) -> None:
+    assert track.camera is not None
+    reasons.setdefault(track.camera, error)
+
+
+def _warn(error: StreamError, more: str = "") -> None:
+    warnings.warn(f"{error}{more}", MvCodecWarning, stacklevel=3)

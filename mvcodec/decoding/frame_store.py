@@ -1,0 +1,229 @@
+"""Any frame set of a file, by number: a bounded cache before decoders that start at keyframes."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mvcodec.container import McapReader
+from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.decoding.frame_table import FrameTable, read_frame_table
+from mvcodec.errors import StreamError
+from mvcodec.frames import DecodedSet
+
+CACHE_BYTES = 256 << 20
+MIN_CACHED = 3
+MAX_CURSORS = 2
+"""Places of the file that are decoded from at once; clients share them where they watch the same part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """Frames that cannot be decoded.
+
+    Attributes:
+        first, end: frame numbers, the first damaged one and the next keyframe (or the file's end).
+        message: what is wrong, with topic and time.
+    """
+
+    first: int
+    end: int
+    message: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredFrame:
+    """What `FrameStore.fetch` found.
+
+    Attributes:
+        number: asked for.
+        decoded: the frame set; the nearest good one where that is damaged; None if none is good.
+        damage: why `decoded` is not the one asked for, or None.
+        decode_ms: time spent on decoding it; 0 where it was at hand.
+    """
+
+    number: int
+    decoded: DecodedSet | None
+    damage: Damage | None
+    decode_ms: float
+
+
+class FrameStore:
+    """Frame sets by number. Safe to use from several threads.
+
+    Args:
+        path: an MCAP file, complete or cut off.
+        cache_bytes: decoded frame sets are kept up to this size (and at least three of them).
+        limits: what is more than that is refused.
+
+    Raises:
+        InputError, StreamError: as `read_frame_table`.
+    """
+
+    def __init__(self, path: Path, cache_bytes: int = CACHE_BYTES, limits: Limits = DEFAULT_LIMITS) -> None:
+        self.path = path
+        self._limits = limits
+        table = read_frame_table(path, limits)
+        self.table: FrameTable = replace(table, cut_off=table.cut_off and self._told(table.cut_off))
+        self._cache = _Cache(cache_bytes)
+        self._cursors: list[_Cursor] = []
+        self._damage: dict[int, Damage] = {}
+        self._decoding = threading.Lock()
+
+    @property
+    def damages(self) -> tuple[Damage, ...]:
+        """The damage that was met so far, in order."""
+        return tuple(sorted(self._damage.copy().values(), key=lambda damage: damage.first))
+
+    def fetch(self, number: int) -> StoredFrame:
+        """Frame set `number` (0..count-1); decoding starts at its keyframe, unless it is at hand."""
+        cached = self._cache.get(number)
+        if cached is not None:
+            return StoredFrame(number, cached, None, 0.0)
+        start = time.perf_counter()
+        with self._decoding:
+            decoded = self._decode(number)
+            damage = None
+            if decoded is None:
+                damage = self._damage[self.table.keyframe_before(number)]
+                decoded = self._stand_in(damage)
+        return StoredFrame(number, decoded, damage, 1000 * (time.perf_counter() - start))
+
+    def close(self) -> None:
+        """Let go of the file."""
+        with self._decoding:
+            while self._cursors:
+                self._cursors.pop().close()
+
+    def _decode(self, number: int) -> DecodedSet | None:
+        """Decode up to a frame, or return None where it is damaged."""
+        cached = self._cache.get(number)
+        if cached is not None:
+            return cached
+        keyframe = self.table.keyframe_before(number)
+        known = self._damage.get(keyframe)
+        if known is not None and number >= known.first:
+            return None
+        cursor = self._cursor(number, keyframe)
+        decoded = None
+        try:
+            while cursor.next <= number:
+                at = cursor.next
+                decoded = cursor.advance()
+                self._cache.put(at, decoded)
+        except StreamError as error:
+            self._cursors.remove(cursor)
+            cursor.close()
+            self._note_damage(cursor.next, error)
+            return None
+        return decoded
+
+    def _cursor(self, number: int, keyframe: int) -> _Cursor:
+        """The cursor that is nearest before a frame, at its keyframe at the earliest; the last used last."""
+        usable = [cursor for cursor in self._cursors if keyframe <= cursor.next <= number]
+        if usable:
+            cursor = max(usable, key=lambda cursor: cursor.next)
+            self._cursors.remove(cursor)
+        else:
+            if len(self._cursors) == MAX_CURSORS:
+                self._cursors.pop(0).close()
+            cursor = _Cursor(self.path, keyframe, self._limits)
+        self._cursors.append(cursor)
+        return cursor
+
+    def _note_damage(self, frame: int, error: StreamError) -> None:
+        table = self.table
+        damage = Damage(frame, table.keyframe_after(frame), self._told(str(error)))
+        self._damage[table.keyframe_before(frame)] = damage
+
+    def _told(self, message: str) -> str:
+        """A message for viewers, whose business the server's folders are not."""
+        return message.replace(str(self.path), self.path.name)
+
+    def _stand_in(self, damage: Damage) -> DecodedSet | None:
+        """The last good frame before damage, else the first good one behind it."""
+        for number in (*range(damage.first - 1, -1, -1), *range(damage.end, self.table.count)):
+            known = self._damage.get(self.table.keyframe_before(number))
+            if known is not None and number >= known.first:
+                continue
+            decoded = self._decode(number)
+            if decoded is not None:
+                return decoded
+        return None
+
+
+class _Cache:
+    """The frame sets used last, bounded in bytes."""
+
+    def __init__(self, limit_bytes: int) -> None:
+        self._limit = limit_bytes
+        self._held: OrderedDict[int, DecodedSet] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, number: int) -> DecodedSet | None:
+        with self._lock:
+            found = self._held.get(number)
+            if found is not None:
+                self._held.move_to_end(number)
+            return found
+
+    def put(self, number: int, decoded: DecodedSet) -> None:
+        room = max(MIN_CACHED, self._limit // _bytes_of(decoded))
+        with self._lock:
+            self._held[number] = decoded
+            self._held.move_to_end(number)
+            while len(self._held) > room:
+                self._held.popitem(last=False)
+
+
+def _bytes_of(decoded: DecodedSet) -> int:
+    pictures = sum(picture.nbytes for picture in decoded.pictures.values())
+    maps = decoded.disparities.values()
+    return pictures + sum(item.values_px.nbytes + item.valid.nbytes for item in maps)
+
+
+class _Cursor:
+    """A decoder at a place in the file.
+
+    Attributes:
+        next: the frame that `advance` returns.
+    """
+
+    def __init__(self, path: Path, keyframe: int, limits: Limits) -> None:
+        self.next = keyframe
+        self._reader = McapReader.open(path, limits)
+        self._packets = self._reader.packets(keyframe)
+        self._decoder = Decoder(limits=limits)
+
+    def advance(self) -> DecodedSet:
+        """Decode one frame set.
+
+        Raises:
+            StreamError: it is damaged or missing.
+        """
+        done: list[DecodedSet] = []
+        wanted = None
+        for number, packet in self._packets:
+            # A file without an index is read from its front; what lies before the keyframe is skipped.
+            if number < self.next:
+                continue
+            if number == self.next:
+                wanted = packet.index
+            # A frame set that lacks a camera comes out with the first packet of the next.
+            done = self._decoder.push(packet)
+            if done:
+                break
+        else:
+            done = self._decoder.flush()
+        if done and done[0].index == wanted:
+            self.next += 1
+            return done[0]
+        raise StreamError(self._reader.name, f"no frame set {self.next}", "one, as the index says")
+
+    def close(self) -> None:
+        self._decoder.flush()
+        self._reader.close()
