@@ -1,6 +1,7 @@
 # make demo       the main job on the sample scene, into ./demo (INPUT=folder: on an array folder)
 # make test       lint, types, import rules, tests (under ten minutes on two cores)
 # make test-slow  the tests that take more than a minute each
+# make docs       the documents, from docs/ into site/ (open site/index.html)
 # make benchmark  quality and speed on DATA=folder (an array folder or a folder of them)
 # make fuzz       damaged input to everything that reads files, SECONDS=120 for each of five readers (Linux on x86-64)
 # make lint       ruff, mypy, import-linter
@@ -22,7 +23,7 @@ NEEDS_PYTHON = $(if $(PYTHON),,$(error mvcodec needs Python 3.11 or newer; none 
 NEEDS_VENV = $(if $(shell $(PYTHON) -c 'import sys, venv, ensurepip; print(sys.version_info >= (3, 11) or "")' 2>/dev/null),,\
 	$(error mvcodec needs Python 3.11 or newer with the venv module (Debian, Ubuntu: apt install python3-venv); $(PYTHON) is not))
 
-.PHONY: demo test test-slow benchmark fuzz lint
+.PHONY: demo test test-slow docs benchmark fuzz lint
 
 demo: $(STAMP)
 	$(BIN)/python tools/demo.py $(if $(INPUT),--input "$(INPUT)") --out "$(OUT)"
@@ -32,6 +33,9 @@ test: lint
 
 test-slow: $(STAMP)
 	$(BIN)/pytest -m slow
+
+docs: $(STAMP)
+	$(BIN)/mkdocs build --strict --quiet
 
 benchmark: $(STAMP)
 	$(BIN)/python tools/benchmark.py --data "$(DATA)"

@@ -36,7 +36,7 @@ TMIV_RETUNED = {
     "shop_s1": 35.03,
     "shop_s2": 34.26,
 }
-"""What MPEG's renderer, retuned, makes of plain SGBM maps of horizontal partners, dB (SYNTHESIS_NOTES.md)."""
+"""MPEG's renderer, retuned, on plain SGBM maps of horizontal partners, dB (docs/measurements.md)."""
 
 CODED = {
     "shop_v3": (32, 300, 32.0),

@@ -84,6 +84,13 @@ def _run(arguments: Sequence[str]) -> int:
     return 0
 
 
+def command_parser(name: str) -> argparse.ArgumentParser:
+    """The parser of one command alone, with all its options; for its documents."""
+    parser = OneLineParser(prog=f"mvcodec {name}", description=COMMANDS[name], allow_abbrev=False)
+    _module(name).add_arguments(parser)
+    return parser
+
+
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     parser = OneLineParser(prog="mvcodec", description=mvcodec.__doc__, allow_abbrev=False)
     parser.add_argument("--version", action="version", version=f"mvcodec {mvcodec.__version__}")

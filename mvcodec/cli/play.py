@@ -21,7 +21,7 @@ MAX_PORT = 65535
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``play``."""
-    parser.add_argument("input", type=local_path, metavar="FILE.mcap")
+    parser.add_argument("input", type=local_path, metavar="FILE.mcap", help="the file to watch")
     parser.add_argument(
         "--original", type=local_path, metavar="ARRAY", help="array folder to measure the pictures against"
     )

@@ -15,8 +15,8 @@ from mvcodec.errors import MvCodecWarning, SettingError, StreamError
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``recover``."""
-    parser.add_argument("input", type=local_path, metavar="IN.mcap")
-    parser.add_argument("output", type=local_path, metavar="OUT.mcap")
+    parser.add_argument("input", type=local_path, metavar="IN.mcap", help="a damaged or unfinished file")
+    parser.add_argument("output", type=local_path, metavar="OUT.mcap", help="the clean one")
     parser.add_argument(
         "--incomplete",
         choices=("keep", "drop"),

@@ -28,7 +28,7 @@ class NotClean(MvCodecError):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``validate``."""
-    parser.add_argument("input", type=local_path, metavar="FILE.mcap")
+    parser.add_argument("input", type=local_path, metavar="FILE.mcap", help="the file to check")
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     add_limits(parser)
 

@@ -61,7 +61,7 @@ class ArrayFacts:
         return cls(**(facts | changes))
 
     def document(self) -> dict[str, Any]:
-        """The JSON object of ARRAY_FOLDER.md, without the pictures' names."""
+        """The JSON object of docs/array-folders.md, without the pictures' names."""
         document: dict[str, Any] = {"rows": self.rows, "cols": self.cols, "fps": self.fps, "rho": self.rho}
         if self.name:
             document = {"name": self.name} | document
@@ -188,7 +188,7 @@ class ArrayFolderWriter:
 
 
 def write_manifest(folder: Path, facts: ArrayFacts, files: Mapping[str, Any]) -> None:
-    """Write `array.json`: the facts and the keys that name the files (ARRAY_FOLDER.md).
+    """Write `array.json`: the facts and the keys that name the files (docs/array-folders.md).
 
     Raises:
         OutputError: the system refuses.

@@ -86,7 +86,7 @@ class ViewWriter(Protocol):
 
 
 class ArrayForm:
-    """An array folder (ARRAY_FOLDER.md) with `real` and `first_frame`.
+    """An array folder (docs/array-folders.md) with `real` and `first_frame`.
 
     Raises:
         SettingError: the plan is no full grid.
