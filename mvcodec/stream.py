@@ -12,13 +12,15 @@ from typing import Any
 from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.errors import SettingError, StreamError
 
-FORMAT_VERSION = 1
+FORMAT_VERSIONS = (1, 2)
+"""The versions that are read. Written is the lowest that holds all that a decoder must know."""
 
 DISPARITY_SCALES = (1, 2)
 """Pixels of a picture, each way, for one sample of its map."""
 
-DISPARITY_CAMERAS = ("all", "alternate")
-"""Which real cameras send a map: every one, or every second one, as the white fields of a chess board."""
+DISPARITY_CAMERAS = ("all", "alternate", "none")
+"""Which real cameras send a map: every one; every second one, as the white fields of a chess board; none,
+so that the decoder estimates all maps from the decoded pictures."""
 
 
 class TrackKind(StrEnum):
@@ -111,6 +113,11 @@ class StreamHeader:
             raise SettingError("disparity_cameras", self.disparity_cameras, " or ".join(DISPARITY_CAMERAS))
 
     @property
+    def version(self) -> int:
+        """The lowest format version that can say this."""
+        return 2 if self.disparity_cameras == "none" else 1
+
+    @property
     def tracks(self) -> tuple[Track, ...]:
         """The video tracks: pictures of every real camera, then the maps."""
         pictures = (Track(TrackKind.TEXTURE, camera) for camera in self.array.real)
@@ -127,7 +134,7 @@ class StreamHeader:
         array = asdict(self.array)
         document = {
             "format": "mvcodec",
-            "version": FORMAT_VERSION,
+            "version": self.version,
             "codec": self.codec,
             "array": array,
             "disparity_range_px": list(self.disparity_range_px),
@@ -152,12 +159,17 @@ class StreamHeader:
         if not isinstance(document, dict) or document.get("format") != "mvcodec":
             raise StreamError(source, "a header of another format", "mvcodec's header")
         version = document.get("version")
-        if version != FORMAT_VERSION:
-            raise StreamError(source, f"format version {version}", f"version {FORMAT_VERSION}")
+        if version not in FORMAT_VERSIONS:
+            expected = " or ".join(map(str, FORMAT_VERSIONS))
+            raise StreamError(source, f"format version {version}", f"version {expected}")
         try:
-            return cls._from_document(document)
+            header = cls._from_document(document)
         except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
             raise StreamError(source, f"a damaged header ({error})", "the fields of FORMAT.md") from None
+        if header.version > version:
+            found = f"disparity_cameras {header.disparity_cameras} in a header of version {version}"
+            raise StreamError(source, found, f"version {header.version}")
+        return header
 
     @classmethod
     def _from_document(cls, document: Mapping[str, Any]) -> StreamHeader:
@@ -190,6 +202,8 @@ def map_cameras(array: CameraArray, which: str) -> tuple[Position, ...]:
     """The real cameras that send a map, in row order; `which` is one of DISPARITY_CAMERAS."""
     if which == "all":
         return array.real
+    if which == "none":
+        return ()
     return tuple(
         (row, col)
         for down, row in enumerate(array.real_rows)

@@ -93,6 +93,7 @@ CASES: dict[str, Case] = {
     "calibrated": Case(_calibrated(), (0, 1), {"qp": None, "crf": 30.0}),
     "half_size_maps": Case(_nominal(2, 3, 35, 50, 10.0), (0, 1, 2), {"qp": 30, "disparity_scale": 2}),
     "alternate_maps": Case(_calibrated(), (0, 1, 2), {"qp": 32, "gop": 2, "disparity_cameras": "alternate"}),
+    "no_maps": Case(_calibrated(), (0, 1, 2), {"qp": 32, "gop": 2, "disparity_cameras": "none"}),
     "depth": Case(_calibrated(), (0, 1), {"qp": 34, "depth": True}),
     "hevc": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 30, "codec": "hevc", "gop": 2}),
     "av1": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 40, "codec": "av1", "gop": 2}),

@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 
 from mvcodec.errors import SettingError
+from mvcodec.stream import StreamHeader
 
 NEGATIVE_VALUES = ("--disparity-range", "--frames", "--max-depth", "--refocus", "--view")
 """Options whose value may begin with a minus sign."""
@@ -132,6 +133,28 @@ def add_synthesizer(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
     )
+
+
+def add_matcher(parser: argparse.ArgumentParser) -> None:
+    """``--matcher NAME``, of commands that decode."""
+    from mvcodec.layers.refinement import matcher_choices
+
+    parser.add_argument(
+        "--matcher",
+        metavar="NAME",
+        help=f"what estimates the maps of a file that holds none; {matcher_choices()}"
+        " (default: the one that the file names)",
+    )
+
+
+def check_matcher(matcher: str | None, header: StreamHeader) -> None:
+    """Refuse ``--matcher`` where it would have no effect.
+
+    Raises:
+        SettingError: it is given, and the file holds maps.
+    """
+    if matcher is not None and header.map_cameras:
+        raise SettingError("--matcher", matcher, "no such option: the file holds maps")
 
 
 def add_frames(parser: argparse.ArgumentParser, what: str) -> None:

@@ -9,6 +9,7 @@ from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource
 from mvcodec.cli.arguments import disparity_qp, disparity_range, pair_of_sizes
 from mvcodec.cli.paths import local_path
+from mvcodec.encoding.config import AUTO
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.frames import FrameSet
 from mvcodec.layers.refinement import matcher_choices
@@ -72,9 +73,11 @@ def _add_disparity(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--disparity-cameras",
-        choices=DISPARITY_CAMERAS,
-        help="the real cameras that send a map; alternate: every second one, and decoders derive the others'"
-        " (default: chosen for the pictures' QP)",
+        choices=(*DISPARITY_CAMERAS, AUTO),
+        help="the real cameras that send a map; alternate: every second one, and decoders derive the others';"
+        " none: decoders estimate all maps, which takes them as long as it takes encoders, and readers of"
+        " format version 1 refuse the file; auto: what costs fewest bits"
+        " (default: all or alternate, chosen for the pictures' QP)",
     )
     parser.add_argument(
         "--disparity-median",

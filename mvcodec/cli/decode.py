@@ -13,7 +13,15 @@ from pathlib import Path
 from typing import BinaryIO, cast
 
 from mvcodec.array import Viewpoint
-from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, pair_of_sizes, view
+from mvcodec.cli.arguments import (
+    add_frames,
+    add_matcher,
+    add_output_options,
+    add_synthesizer,
+    check_matcher,
+    pair_of_sizes,
+    view,
+)
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.progress import progress
@@ -71,6 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="one view, in steps of the input's grid; repeatable",
     )
     add_synthesizer(parser)
+    add_matcher(parser)
     parser.add_argument(
         "--provenance",
         action="store_true",
@@ -100,11 +109,14 @@ def run(arguments: argparse.Namespace) -> None:
     damage: StreamError | None = None
     with (
         _source(arguments) as source,
-        Decoder.open(source, arguments.frames, arguments.on_error, limits_of(arguments)) as decoder,
+        Decoder.open(
+            source, arguments.frames, arguments.on_error, limits_of(arguments), arguments.matcher
+        ) as decoder,
         ThreadPoolExecutor(THREADS, "render") as pool,
         progress("decode", _frame_total(source, arguments.frames), quiet=arguments.quiet) as bar,
         ExitStack() as outputs,
     ):
+        check_matcher(arguments.matcher, decoder.header)
         plan = _plan(decoder.header, arguments)
         sink: Sink | None = None
         frames = 0

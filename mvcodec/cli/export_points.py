@@ -7,7 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from mvcodec.capture.manifest import read_calibration
-from mvcodec.cli.arguments import add_frames, add_output_options, positive_int, positive_number
+from mvcodec.cli.arguments import (
+    add_frames,
+    add_matcher,
+    add_output_options,
+    check_matcher,
+    positive_int,
+    positive_number,
+)
 from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
@@ -41,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--calibration", type=Path, metavar="FILE", help="JSON with the calibration as in array.json"
     )
     parser.add_argument("--nominal", action="store_true", help="accept nominal calibration")
+    add_matcher(parser)
     add_frames(parser, "frames of the file to export")
     add_on_error(parser, "stop")
     add_limits(parser)
@@ -57,10 +65,13 @@ def run(arguments: argparse.Namespace) -> None:
     if target.resolve() == Path(arguments.input).resolve():
         raise SettingError("OUT", target, "another file than IN.mcap")
     with (
-        Decoder.open(arguments.input, arguments.frames, arguments.on_error, limits_of(arguments)) as decoder,
+        Decoder.open(
+            arguments.input, arguments.frames, arguments.on_error, limits_of(arguments), arguments.matcher
+        ) as decoder,
         progress("export", None, quiet=arguments.quiet) as bar,
         PointWriter(target) as writer,
     ):
+        check_matcher(arguments.matcher, decoder.header)
         array = decoder.header.array
         if arguments.calibration is not None:
             array = replace(array, calibration=read_calibration(arguments.calibration))

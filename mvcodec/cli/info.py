@@ -9,7 +9,9 @@ from dataclasses import asdict
 from typing import Any
 
 from mvcodec.container import StreamInfo, read_info
+from mvcodec.decoding.estimated_maps import DEFAULT_MATCHER
 from mvcodec.errors import MvCodecWarning, StreamError
+from mvcodec.stream import StreamHeader
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,9 +31,7 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"{arguments.input}: {summary(info)}")
     print(f"  grid         {array.rows} x {array.cols}, {array.width} x {array.height} px, {array.fps:g} fps")
     print(f"  real         {len(array.real)} cameras: rows {rows}, cols {cols}")
-    size = "half" if info.header.disparity_scale == 2 else "full"
-    maps = f"maps of {size} size from {count(len(info.header.map_cameras), 'camera')}"
-    print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras, {maps}")
+    print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras, {_maps(info.header)}")
     print(f"  calibration  {'given' if array.calibration.given else 'nominal (the input stated none)'}")
     if info.dropped is not None:
         print(f"  dropped      {count(info.dropped, 'frame set')}, left out while encoding live")
@@ -43,6 +43,14 @@ def run(arguments: argparse.Namespace) -> None:
 
 def _warn(error: StreamError) -> None:
     warnings.warn(str(error), MvCodecWarning, stacklevel=3)
+
+
+def _maps(header: StreamHeader) -> str:
+    if not header.map_cameras:
+        matcher = header.settings.get("matcher", DEFAULT_MATCHER)
+        return f"no maps: decoders estimate {len(header.array.real)} a frame set, by matcher {matcher}"
+    size = "half" if header.disparity_scale == 2 else "full"
+    return f"maps of {size} size from {count(len(header.map_cameras), 'camera')}"
 
 
 def document(info: StreamInfo) -> dict[str, Any]:
@@ -60,6 +68,7 @@ def document(info: StreamInfo) -> dict[str, Any]:
         "disparity_range_px": list(info.header.disparity_range_px),
         "disparity_scale": info.header.disparity_scale,
         "disparity_cameras": info.header.disparity_cameras,
+        "version": info.header.version,
         "calibration": "given" if array.calibration.given else "nominal",
     }
 

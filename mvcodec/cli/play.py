@@ -8,7 +8,7 @@ from contextlib import suppress
 from functools import partial
 from importlib.util import find_spec
 
-from mvcodec.cli.arguments import add_synthesizer
+from mvcodec.cli.arguments import add_matcher, add_synthesizer, check_matcher
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.errors import MissingExtra
@@ -29,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=_port, default=0, help="0 takes any free one (default: 0)")
     parser.add_argument("--no-browser", action="store_true", help="print the URL, open no browser")
     add_synthesizer(parser)
+    add_matcher(parser)
     add_on_error(parser, "skip")
     add_limits(parser)
 
@@ -51,8 +52,10 @@ def run(arguments: argparse.Namespace) -> None:
         partial(make_synthesizer, arguments.synthesizer),
         partial(make_synthesizer, quicker) if quicker else None,
         limits_of(arguments),
+        arguments.matcher,
     )
     try:
+        check_matcher(arguments.matcher, maker.store.table.header)
         if arguments.original is not None:
             maker.originals = Originals(open_input([arguments.original]), maker.store.table.header.array)
         broadcast = Broadcast(

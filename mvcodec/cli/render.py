@@ -11,7 +11,15 @@ from pathlib import Path
 from tqdm import tqdm
 
 from mvcodec.array import CameraArray, Viewpoint
-from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, pair_of_sizes, view
+from mvcodec.cli.arguments import (
+    add_frames,
+    add_matcher,
+    add_output_options,
+    add_synthesizer,
+    check_matcher,
+    pair_of_sizes,
+    view,
+)
 from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
@@ -68,6 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="views of a mosaic, quilt or refocused picture; 1xN: of an epipolar slice",
     )
     add_synthesizer(parser)
+    add_matcher(parser)
     add_frames(parser, "frames of the file")
     add_on_error(parser, "stop")
     add_limits(parser)
@@ -80,7 +89,10 @@ def run(arguments: argparse.Namespace) -> None:
     write = find_writer(arguments.output)
     _check_settings(arguments)
     limits = limits_of(arguments)
-    with Decoder.open(arguments.input, arguments.frames, arguments.on_error, limits) as decoder:
+    with Decoder.open(
+        arguments.input, arguments.frames, arguments.on_error, limits, arguments.matcher
+    ) as decoder:
+        check_matcher(arguments.matcher, decoder.header)
         array, count = decoder.header.array, _frame_count(arguments, limits)
         places = _places(arguments, array, count)
         sets = iter(decoder)

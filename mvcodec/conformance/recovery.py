@@ -11,6 +11,7 @@ from mvcodec.container import McapReader, McapWriter
 from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.decoding.estimated_maps import can_be_estimated
 from mvcodec.errors import SettingError, StreamError
 from mvcodec.stream import Packet, StreamHeader, Track, TrackKind
 from mvcodec.video.codec import Watch
@@ -215,6 +216,10 @@ class _Copier:
 
     def _can_be_shown(self, usable: dict[Track, Packet]) -> bool:
         """Whether there is a camera with picture and map, without which nothing is decoded."""
+        if not self._header.map_cameras:
+            array = self._header.array
+            there = [camera for camera in array.real if Track(TrackKind.TEXTURE, camera) in usable]
+            return can_be_estimated(array, there)
         kinds = (TrackKind.TEXTURE, TrackKind.DISPARITY)
         return any(
             all(Track(kind, camera) in usable for kind in kinds) for camera in self._header.map_cameras

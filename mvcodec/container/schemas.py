@@ -40,7 +40,7 @@ HEADER_SCHEMA = json.dumps(
             "array": {"type": "object"},
             "disparity_range_px": {"type": "array"},
             "disparity_scale": {"enum": [1, 2]},
-            "disparity_cameras": {"enum": ["all", "alternate"]},
+            "disparity_cameras": {"enum": ["all", "alternate", "none"]},
             "first_frame": {"type": "integer"},
             "settings": {"type": "object"},
         },

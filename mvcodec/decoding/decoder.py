@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 from functools import partial
@@ -16,9 +16,16 @@ from mvcodec.container import McapReader
 from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.decoding.derived_maps import derive_map
+from mvcodec.decoding.estimated_maps import (
+    MapsOnDemand,
+    can_be_estimated,
+    decoding_matcher,
+    estimate_maps,
+)
 from mvcodec.decoding.stand_in import fill_absent
 from mvcodec.errors import MissingReference, MvCodecWarning, SettingError, StreamClosed, StreamError
 from mvcodec.frames import DecodedSet, DisparityMap, Picture
+from mvcodec.stereo.matcher import Matcher
 from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, view_name
 from mvcodec.video.codec import Planes
 from mvcodec.video.codecs import find_codec
@@ -44,12 +51,23 @@ class Decoder(Closing):
     Args:
         on_error: at damage, ``stop``: raise StreamError; ``skip``: warn, and go on with the next keyframe.
         limits: what is more than that is refused.
+        matcher: estimates the maps of a stream that holds none, by name or one's own; by default the one
+            that the stream's settings name. It runs when the first map of a frame set is looked at.
+
+    Raises:
+        SettingError: another policy, or (where a stream needs it) no matcher of that name.
     """
 
-    def __init__(self, on_error: OnError = "stop", limits: Limits = DEFAULT_LIMITS) -> None:
+    def __init__(
+        self,
+        on_error: OnError = "stop",
+        limits: Limits = DEFAULT_LIMITS,
+        matcher: str | Matcher | None = None,
+    ) -> None:
         if on_error not in get_args(OnError):
             raise SettingError("on_error", on_error, " or ".join(get_args(OnError)))
-        self._on_error, self._limits = on_error, limits
+        self._on_error, self._limits, self._asked_matcher = on_error, limits, matcher
+        self._matcher: Matcher | None = None
         self._header: StreamHeader | None = None
         self._decoders: dict[Track, TrackDecoder] = {}
         self._absent: frozenset[Position] = frozenset()
@@ -67,20 +85,21 @@ class Decoder(Closing):
         frames: slice | None = None,
         on_error: OnError = "stop",
         limits: Limits = DEFAULT_LIMITS,
+        matcher: str | Matcher | None = None,
     ) -> Decoder:
         """A decoder of a file, pipe or standard input, to iterate over.
 
         Args:
             source: path, URL of a file on a web server, or a binary file that may be a pipe and stays open.
             frames: Python slice over the frame sets that the file holds (from 0), step 1.
-            on_error, limits: as the constructor's.
+            on_error, limits, matcher: as the constructor's.
 
         Raises:
             InputError: the system refuses to open it.
             StreamError: not an MCAP file, none of ours, or one of a newer format version.
             SettingError (on iterating): the slice is empty.
         """
-        decoder = cls(on_error, limits)
+        decoder = cls(on_error, limits, matcher)
         try:
             decoder._reader = McapReader.open(source, limits, _warn if on_error == "skip" else None)
             decoder._name = decoder._reader.name
@@ -195,6 +214,7 @@ class Decoder(Closing):
         except SettingError as error:
             raise StreamError(self._name, f"codec {error.found}", error.expected) from None
         sizes = track_sizes(header.array.width, header.array.height, header.disparity_scale)
+        self._matcher = None if header.map_cameras else decoding_matcher(header, self._asked_matcher)
         self._header = header
         self._decoders = {track: TrackDecoder(codec, sizes[track.kind]) for track in header.tracks}
         self._assembler.start(header.tracks)
@@ -218,28 +238,45 @@ class Decoder(Closing):
         self._skipping = True
 
     def _decode(self, packets: PacketSet) -> list[DecodedSet]:
-        """Decode a frame set; nothing, where no camera with a map is there."""
+        """Decode a frame set; nothing, where no map can be had of any camera that is there."""
         planes, reasons = self._planes(packets)
         array, span, first = self.header.array, self.header.disparity_range_px, packets.first
         self._tell_absent(reasons, first)
         there = [camera for camera in array.real if camera not in reasons]
         senders = [camera for camera in self.header.map_cameras if camera not in reasons]
-        if not senders:
+        if not (senders or (self._matcher and can_be_estimated(array, there))):
             return []
         assert self._pool is not None
         textures = [planes[Track(TrackKind.TEXTURE, camera)] for camera in there]
-        maps = [planes[Track(TrackKind.DISPARITY, camera)] for camera in senders]
         pictures = dict(zip(there, self._pool.map(self._picture, textures), strict=True))
-        found = self._pool.map(self._map, maps, [pictures[camera] for camera in senders])
-        sent = dict(zip(senders, found, strict=True))
-        others = [camera for camera in there if camera not in sent]
-        derived = self._pool.map(partial(derive_map, array, sent, span), others)
-        known = sent | dict(zip(others, derived, strict=True))
-        disparities = {camera: known[camera] for camera in there}
+        disparities: Mapping[Position, DisparityMap]
+        if self._matcher is None:
+            disparities = self._sent_maps(planes, there, senders, pictures)
+        else:
+            find = partial(estimate_maps, array, pictures, span, self._matcher)
+            disparities = MapsOnDemand(there, find)
         if reasons:
             pictures, disparities = fill_absent(array, pictures, disparities)
         absent = tuple(camera for camera in array.real if camera in reasons)
         return [DecodedSet(array, first.index, first.time_ns, pictures, disparities, span, absent)]
+
+    def _sent_maps(
+        self,
+        planes: Mapping[Track, Planes],
+        there: Sequence[Position],
+        senders: Sequence[Position],
+        pictures: Mapping[Position, Picture],
+    ) -> dict[Position, DisparityMap]:
+        """The maps of the cameras that are there: as sent, and of those that send none as derived."""
+        assert self._pool is not None
+        maps = [planes[Track(TrackKind.DISPARITY, camera)] for camera in senders]
+        found = self._pool.map(self._map, maps, [pictures[camera] for camera in senders])
+        sent = dict(zip(senders, found, strict=True))
+        others = [camera for camera in there if camera not in sent]
+        span = self.header.disparity_range_px
+        derived = self._pool.map(partial(derive_map, self.header.array, sent, span), others)
+        known = sent | dict(zip(others, derived, strict=True))
+        return {camera: known[camera] for camera in there}
 
     def _planes(self, packets: PacketSet) -> tuple[dict[Track, Planes], dict[Position, StreamError]]:
         """Decode every track. What is missing is a reason why its camera is absent; damage is raised."""

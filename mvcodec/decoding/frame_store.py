@@ -8,12 +8,15 @@ from collections import OrderedDict
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from mvcodec.container import McapReader
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.decoding.frame_table import FrameTable, read_frame_table
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet
+from mvcodec.stereo.matcher import Matcher
 
 CACHE_BYTES = 256 << 20
 MIN_CACHED = 3
@@ -59,14 +62,21 @@ class FrameStore:
         path: an MCAP file, complete or cut off.
         cache_bytes: decoded frame sets are kept up to this size (and at least three of them).
         limits: what is more than that is refused.
+        matcher: as `Decoder`'s.
 
     Raises:
         InputError, StreamError: as `read_frame_table`.
     """
 
-    def __init__(self, path: Path, cache_bytes: int = CACHE_BYTES, limits: Limits = DEFAULT_LIMITS) -> None:
+    def __init__(
+        self,
+        path: Path,
+        cache_bytes: int = CACHE_BYTES,
+        limits: Limits = DEFAULT_LIMITS,
+        matcher: str | Matcher | None = None,
+    ) -> None:
         self.path = path
-        self._limits = limits
+        self._limits, self._matcher = limits, matcher
         table = read_frame_table(path, limits)
         self.table: FrameTable = replace(table, cut_off=table.cut_off and self._told(table.cut_off))
         self._cache = _Cache(cache_bytes)
@@ -131,7 +141,7 @@ class FrameStore:
         else:
             if len(self._cursors) == MAX_CURSORS:
                 self._cursors.pop(0).close()
-            cursor = _Cursor(self.path, keyframe, self._limits)
+            cursor = _Cursor(self.path, keyframe, self._limits, self._matcher)
         self._cursors.append(cursor)
         return cursor
 
@@ -182,8 +192,9 @@ class _Cache:
 
 def _bytes_of(decoded: DecodedSet) -> int:
     pictures = sum(picture.nbytes for picture in decoded.pictures.values())
-    maps = decoded.disparities.values()
-    return pictures + sum(item.values_px.nbytes + item.valid.nbytes for item in maps)
+    # Maps that are made when somebody looks at them count as if they were there.
+    pixels = len(decoded.disparities) * decoded.array.height * decoded.array.width
+    return pictures + pixels * (np.float32().nbytes + np.bool_().nbytes)
 
 
 class _Cursor:
@@ -193,11 +204,11 @@ class _Cursor:
         next: the frame that `advance` returns.
     """
 
-    def __init__(self, path: Path, keyframe: int, limits: Limits) -> None:
+    def __init__(self, path: Path, keyframe: int, limits: Limits, matcher: str | Matcher | None) -> None:
         self.next = keyframe
         self._reader = McapReader.open(path, limits)
         self._packets = self._reader.packets(keyframe)
-        self._decoder = Decoder(limits=limits)
+        self._decoder = Decoder(limits=limits, matcher=matcher)
 
     def advance(self) -> DecodedSet:
         """Decode one frame set.

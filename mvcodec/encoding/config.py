@@ -12,11 +12,14 @@ from mvcodec.stream import DISPARITY_CAMERAS, map_cameras
 from mvcodec.video.codec import RateControl, check_preset, check_qp
 from mvcodec.video.codecs import find_codec
 from mvcodec.video.disparity_rate import (
+    best_disparity_cameras,
     default_disparity_cameras,
     default_disparity_qp,
     default_disparity_scale,
 )
 from mvcodec.video.map_size import MEDIANS, check_median, check_scale
+
+AUTO = "auto"
 
 DISPARITY_SHARE = 0.12
 """The maps' share in bitrate mode where every camera sends one; at the best map QP it is 0.09 to 0.18 on
@@ -41,8 +44,10 @@ class EncoderConfig:
             a DISPARITY_SHARE of the bit rate. Given, bitrate_kbps is that of the pictures alone.
         disparity_scale: 2: maps are coded at half the pictures' size each way, 1: at all of it; by
             default `default_disparity_scale`.
-        disparity_cameras: the cameras that send a map: all, or alternate: every second one of a row and
-            a column, and the decoder derives the others'; by default `default_disparity_cameras`.
+        disparity_cameras: the cameras that send a map: all; alternate: every second one of a row and
+            a column, and the decoder derives the others'; none: the decoder estimates all maps; auto:
+            what costs fewest bits at equal quality, `best_disparity_cameras`. By default
+            `default_disparity_cameras`, which never leaves all maps to the decoder.
         disparity_median: window of the median that maps are smoothed with before coding, odd, px of
             the coded map; 0: off; by default `MEDIANS` has it for the scale.
         gop: frame sets from keyframe to keyframe, at most one second; by default one second.
@@ -80,8 +85,9 @@ class EncoderConfig:
         check_preset(self.preset)
         check_scale(self.disparity_scale)
         check_median(self.disparity_median)
-        if self.disparity_cameras not in {None, *DISPARITY_CAMERAS}:
-            raise SettingError("disparity_cameras", self.disparity_cameras, " or ".join(DISPARITY_CAMERAS))
+        if self.disparity_cameras not in {None, AUTO, *DISPARITY_CAMERAS}:
+            choices = " or ".join((*DISPARITY_CAMERAS, AUTO))
+            raise SettingError("disparity_cameras", self.disparity_cameras, choices)
         if self.gop is not None and self.gop < 1:
             raise SettingError("gop", self.gop, "at least 1")
         span = self.disparity_range_px
@@ -106,6 +112,8 @@ class EncoderConfig:
 
     def cameras_for(self, array: CameraArray) -> str:
         """Which real cameras of an array send a map, as `StreamHeader.disparity_cameras`."""
+        if self.disparity_cameras == AUTO:
+            return best_disparity_cameras(self.quality, self.codec, array)
         return self.disparity_cameras or default_disparity_cameras(self.quality, self.codec, array)
 
     def rate_of_pictures(self, array: CameraArray) -> RateControl:

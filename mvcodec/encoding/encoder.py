@@ -137,6 +137,8 @@ class Encoder:
             track = Track(TrackKind.TEXTURE, camera)
             jobs[track] = pool.submit(self._code_picture, track, picture, keyframe)
         assert self._header is not None
+        if not (self._header.map_cameras or self.config.depth):
+            return
         maps = self._matcher.match(self.array, pictures, self._header.disparity_range_px)
         values = {camera: self._checked_map(maps, camera) for camera in self.array.real}
         self._maps = values
@@ -169,6 +171,8 @@ class Encoder:
         return {Track(kind, camera): codec.encoder(settings) for camera in cameras}
 
     def _make_map_encoders(self, header: StreamHeader) -> dict[Track, VideoEncoder]:
+        if not header.map_cameras:
+            return {}
         size = coded_size(self.array.width, self.array.height, self._scale)
         rate = self.config.rate_of_maps(self.array, header.disparity_range_px)
         return self._make_encoders(TrackKind.DISPARITY, header.map_cameras, size, rate)
@@ -179,24 +183,25 @@ class Encoder:
             from mvcodec.stereo.disparity_range import estimate_range
 
             span = estimate_range(self.array, [frames], self.array.disparity_hint_px)
-        settings = self._settings_record(self.config.rate_of_maps(self.array, span))
         codec, cameras = self.config.codec, self.config.cameras_for(self.array)
+        maps = None if cameras == "none" else self.config.rate_of_maps(self.array, span)
+        settings = self._settings_record(maps)
         return StreamHeader(self.array, span, codec, frames.index, settings, self._scale, cameras)
 
-    def _settings_record(self, maps: RateControl) -> dict[str, Any]:
+    def _settings_record(self, maps: RateControl | None) -> dict[str, Any]:
         config, codec = self.config, find_codec(self.config.codec)
         matcher = config.matcher if isinstance(config.matcher, str) else type(config.matcher).__name__
         record = {
             "qp": config.qp,
             "crf": config.crf,
             "bitrate_kbps": config.bitrate_kbps,
-            "disparity_qp": maps.qp,
-            "disparity_median": self._median,
+            "disparity_qp": None if maps is None else maps.qp,
+            "disparity_median": None if maps is None else self._median,
             "gop": self._gop,
             "preset": config.preset,
             "matcher": matcher,
             "video": codec.settings(TrackKind.TEXTURE),
-            "disparity": codec.settings(TrackKind.DISPARITY),
+            "disparity": None if maps is None else codec.settings(TrackKind.DISPARITY),
             "encoder": f"mvcodec {mvcodec.__version__}",
         }
         return {name: value for name, value in record.items() if value is not None}

@@ -54,6 +54,7 @@ class PictureMaker:
         make_synthesizer: makes one synthesizer.
         make_quick: makes one for pictures that move, if there is a quicker one.
         limits: a file that needs more is refused.
+        matcher: name of what estimates the maps of a file that holds none; by default as the file says.
 
     Attributes:
         store: the file's frame sets.
@@ -70,8 +71,9 @@ class PictureMaker:
         make_synthesizer: Callable[[], Synthesizer],
         make_quick: Callable[[], Synthesizer] | None = None,
         limits: Limits = DEFAULT_LIMITS,
+        matcher: str | None = None,
     ) -> None:
-        self.store = FrameStore(path, limits=limits)
+        self.store = FrameStore(path, limits=limits, matcher=matcher)
         self.originals: Originals | None = None
         self.levels = SMALLER if make_quick is None else QUICKER
         self._synthesizers = SynthesizerPool(make_synthesizer, WORKERS + 1)

@@ -103,6 +103,13 @@ def default_disparity_cameras(quality: float | None, codec: str, array: CameraAr
     return "alternate" if quality is None or quality >= MODELS[codec].half_from else "all"
 
 
+def best_disparity_cameras(quality: float | None, codec: str, array: CameraArray) -> str:
+    """One of DISPARITY_CAMERAS: what costs fewest bits at equal quality, whatever it takes to decode."""
+    if len(array.real) > 1:
+        return "none"
+    return default_disparity_cameras(quality, codec, array)
+
+
 def default_disparity_qp(
     quality: float, scale: int, cameras: str, range_px: tuple[float, float], codec: str = "h264"
 ) -> int:

@@ -1,0 +1,117 @@
+"""Measures what forms of a file cost at equal quality: maps or none, plain cameras or predicted ones.
+
+    python tools/form_rates.py INPUT [--forms NAME,..] [--qp N,N..] [--matcher NAME] [--real ...]
+                               [--frames A:B] [--json]
+
+Forms: `plain` (what encode writes by default), `none` (no maps in the file). All views of the input's grid
+are rendered and compared, the container counts. The last lines are BD-rates against the first form.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from map_codings import whole_numbers
+
+from mvcodec.capture import ArraySource, open_input, resolve_frames
+from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, join_negative_values
+from mvcodec.cli.coding_options import find_range
+from mvcodec.encoding.encoder import EncoderConfig, find_matcher
+from mvcodec.errors import MvCodecError
+from mvcodec.evaluation.bd import compare_curves
+from mvcodec.evaluation.chain import measure_chain
+from mvcodec.evaluation.points import CurvePoint
+from mvcodec.evaluation.remembered import MapSpool, Remembered
+from mvcodec.synthesis.synthesizers import make_synthesizer
+
+FORMS: Mapping[str, Mapping[str, str]] = {
+    "plain": {},
+    "none": {"disparity_cameras": "none"},
+}
+QPS = "22,27,32,37,42"
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
+    parser.add_argument("input", type=Path, metavar="INPUT", help="an array folder")
+    parser.add_argument("--real", default="corners", help="as for encode (default: %(default)s)")
+    parser.add_argument("--forms", default=",".join(FORMS), help="some of %(default)s")
+    parser.add_argument("--qp", default=QPS, type=whole_numbers, metavar="N,N..", help="default: %(default)s")
+    parser.add_argument("--matcher", default="joint", metavar="NAME")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
+    add_frames(parser, "frames of the input to code")
+    arguments = parser.parse_args(join_negative_values(sys.argv[1:]))
+    try:
+        curves = measure(arguments)
+    except MvCodecError as error:
+        print(f"{Path(sys.argv[0]).stem}: error: {error}", file=sys.stderr)
+        return 2
+    if arguments.json:
+        print(json.dumps({form: [point.to_json() for point in curve] for form, curve in curves.items()}))
+    else:
+        report(curves)
+    return 0
+
+
+def measure(arguments: argparse.Namespace) -> dict[str, list[CurvePoint]]:
+    """The points of every form that was asked for; matching by the encoder is done once."""
+    source = open_input([arguments.input], real=arguments.real)
+    chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
+    base = EncoderConfig(
+        matcher=arguments.matcher, disparity_range_px=find_range(source, chosen, None), qp=arguments.qp[0]
+    )
+    with tempfile.TemporaryDirectory() as folder, MapSpool(Path(folder)) as spool:
+        return {
+            form: [
+                _point(source, chosen, replace(base, qp=qp, **FORMS[form]), spool, Path(folder))  # type: ignore[arg-type]
+                for qp in arguments.qp
+            ]
+            for form in arguments.forms.split(",")
+        }
+
+
+def _point(
+    source: ArraySource, chosen: range, config: EncoderConfig, spool: MapSpool, folder: Path
+) -> CurvePoint:
+    matcher = Remembered(find_matcher(config.matcher), spool)
+    synthesizer = make_synthesizer(DEFAULT_SYNTHESIZER)
+    return measure_chain(source, chosen, config, matcher, synthesizer, folder / "coded.mcap", lambda: None)
+
+
+def _rate_and_quality(point: CurvePoint) -> tuple[float, float]:
+    assert point.quality.psnr_y.all is not None
+    return point.kbps, point.quality.psnr_y.all
+
+
+def report(curves: Mapping[str, list[CurvePoint]]) -> None:
+    """The points of each form, then the distances from the first one."""
+    print(
+        f"{'form':10} {'QP':>3} {'kbit/s':>9} {'Y-PSNR dB':>9} {'virtual':>8} {'maps':>5}"
+        f" {'encode s':>8} {'decode s':>8}"
+    )
+    for form, curve in curves.items():
+        for point in curve:
+            psnr = point.quality.psnr_y
+            virtual = "-" if psnr.virtual is None else f"{psnr.virtual:.2f}"
+            print(
+                f"{form:10} {point.qp:3} {point.kbps:9.1f} {psnr.all:9.3f} {virtual:>8}"
+                f" {point.split.disparity / point.bits:5.0%} {point.encode_seconds:8.1f}"
+                f" {point.decode_seconds:8.1f}"
+            )
+    first, *others = curves
+    pairs = {form: [_rate_and_quality(point) for point in curve] for form, curve in curves.items()}
+    for form in others:
+        delta = compare_curves(pairs[first], pairs[form])
+        percent = "-" if delta.rate_percent is None else f"{delta.rate_percent:+.1f} %"
+        print(f"BD-rate of {form} over {first}: {percent}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
