@@ -1,33 +1,100 @@
-"""Compiled code never outlives a change of what it calls."""
+"""Compiled code is kept where it can be, never outlives a change of what it calls, and compiling is told."""
 
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
-from mvcodec import kernels
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "mvcodec"
+REPORT = (
+    "from mvcodec.kernels import compiled_code\n"
+    "compiled_code.on_first_compilation(lambda: print('compiling'))\n"
+    "from mvcodec.kernels.caller import doubled\n"
+    "print(doubled(21), compiled_code.folder())\n"
+)
+CALLER = (
+    "from numba import njit\nfrom mvcodec.kernels.callee import factor\n\n\n"
+    "@njit(cache=True)\ndef doubled(x):\n    return factor() * x\n"
+)
+CALLEE = "from numba import njit\n\n\n@njit(cache=True)\ndef factor():\n    return {}\n"
 
 
-def write(path: Path, time_s: int) -> Path:
-    path.parent.mkdir(exist_ok=True)
-    path.touch()
-    os.utime(path, (time_s, time_s))
-    return path
+@pytest.fixture
+def installed(tmp_path: Path) -> Path:
+    """A package of two small kernels, one of which calls the other, with the cache as it ships."""
+    kernels = tmp_path / "site" / "mvcodec" / "kernels"
+    kernels.mkdir(parents=True)
+    (kernels.parent / "__init__.py").touch()
+    for name in ("__init__.py", "compiled_code.py"):
+        shutil.copy(PACKAGE / "kernels" / name, kernels)
+    (kernels / "caller.py").write_text(CALLER)
+    (kernels / "callee.py").write_text(CALLEE.format(2))
+    return kernels
 
 
-def test_a_change_of_any_kernel_drops_older_code(tmp_path: Path) -> None:
-    write(tmp_path / "caller.py", 100)
-    write(tmp_path / "callee.py", 200)
-    cache = tmp_path / "__pycache__"
-    older = write(cache / "caller.blend-1.nbi", 150)
-    newer = write(cache / "caller.vote-1.nbi", 250)
-    other = write(cache / "caller.pyc", 150)
-    kernels._drop_stale_code(tmp_path)
-    assert not older.exists()
-    assert newer.exists()
-    assert other.exists()
+def run(installed: Path, **environment: str) -> list[str]:
+    """Whether it compiled, the result and the folder of the cache, from a process of its own."""
+    variables = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    done = subprocess.run(
+        [sys.executable, "-c", REPORT],
+        env=variables | {"PYTHONPATH": str(installed.parents[1])} | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=installed,
+    )
+    return done.stdout.split()
 
 
-def test_nothing_compiled_is_nothing_to_drop(tmp_path: Path) -> None:
-    write(tmp_path / "caller.py", 100)
-    kernels._drop_stale_code(tmp_path)
+def test_it_compiles_once_beside_the_sources(installed: Path) -> None:
+    beside = str(installed / "__pycache__")
+    assert run(installed) == ["compiling", "42", beside]
+    assert run(installed) == ["42", beside]
+
+
+def test_a_change_of_what_a_kernel_calls_is_seen(installed: Path) -> None:
+    run(installed)
+    (installed / "callee.py").write_text(CALLEE.format(3))
+    assert run(installed)[:2] == ["compiling", "63"]
+
+
+def test_the_folder_that_numba_is_told_holds(installed: Path, tmp_path: Path) -> None:
+    told = tmp_path / "told"
+    first, result, at = run(installed, NUMBA_CACHE_DIR=str(told))
+    assert (first, result) == ("compiling", "42")
+    assert Path(at).parent == told
+    assert list(Path(at).glob("*.nbi"))
+    assert not list(installed.glob("__pycache__/*.nbi"))
+
+
+def test_where_nothing_can_be_written_beside_it_it_is_kept_for_the_user(
+    installed: Path, tmp_path: Path
+) -> None:
+    (installed / "__pycache__").touch()  # a file in the folder's place, which not even root can write into
+    home = tmp_path / "cache"
+    environment = {"XDG_CACHE_HOME": str(home), "HOME": str(home), "PYTHONDONTWRITEBYTECODE": "1"}
+    first, result, at = run(installed, **environment)
+    assert (first, result) == ("compiling", "42")
+    assert home in Path(at).parents
+    assert run(installed, **environment) == ["42", at]
+
+
+def test_without_sources_it_works_too(installed: Path) -> None:
+    subprocess.run([sys.executable, "-m", "compileall", "-q", "-b", str(installed.parent)], check=True)
+    for source in installed.parent.rglob("*.py"):
+        source.unlink()
+    assert run(installed)[:2] == ["compiling", "42"]
+    assert run(installed)[0] == "42"
+
+
+def test_nothing_else_of_numba_is_moved() -> None:
+    from mvcodec.kernels.compiled_code import KernelCode
+
+    def other() -> None: ...
+
+    assert KernelCode.from_function(other, __file__) is None  # type: ignore[arg-type]
