@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mvcodec.capture.recording import Recording, RecordingSettings
 from mvcodec.conformance.file_check import FileCheck
-from mvcodec.conformance.unit_rules import UNIT_RULES
+from mvcodec.conformance.unit_rules import UnitRules
 from mvcodec.container import McapReader
 from mvcodec.container.exact_file import ExactFile
 from mvcodec.container.limits import Limits
@@ -18,6 +18,7 @@ from mvcodec.container.records import MAGIC, parse_chunk, read_record, unpack
 from mvcodec.errors import MvCodecError
 from mvcodec.stream import StreamHeader, TrackKind
 from mvcodec.video.bits import NalError
+from mvcodec.video.codecs import CODECS
 from mvcodec.video.h264_syntax import H264Parser
 
 CORPUS = Path(__file__).parent / "fuzz_corpus"
@@ -73,8 +74,8 @@ def parse_nal(data: bytes) -> None:
     """Access units, the first of them a keyframe."""
     with suppress(NalError):
         H264Parser().push(data)
-    for rules in UNIT_RULES.values():
-        checker = rules(TrackKind.TEXTURE, (64, 48))
+    for codec in CODECS.values():
+        checker = UnitRules(codec, TrackKind.TEXTURE, (64, 48))
         for keyframe in (True, False, None):
             list(checker.push(data, keyframe))
 

@@ -18,7 +18,7 @@ from mvcodec.capture import open_input
 from mvcodec.evaluation import fingerprint
 from mvcodec.evaluation.fingerprint import examine, measuring_versions
 from mvcodec.evaluation.study import StudyRun
-from mvcodec.video import disparity_rate
+from mvcodec.video.codecs import CODECS
 from mvcodec.video.pyav import library_versions
 
 
@@ -43,8 +43,8 @@ def test_a_point_hangs_on_the_choice_that_the_model_makes(
     run = study_run(tmp_path, RANGE_PX)
     before = keys(run)
     assert before == keys(run)
-    other = replace(disparity_rate.MODELS["h264"], full=11, half=7)
-    monkeypatch.setitem(disparity_rate.MODELS, "h264", other)
+    other = replace(CODECS["h264"], maps=replace(CODECS["h264"].maps, full=11, half=7))
+    monkeypatch.setitem(CODECS, "h264", other)
     after = keys(run)
     assert before[0] != after[0]
     assert before[1] == after[1]

@@ -25,6 +25,7 @@ from mvcodec.container.limits import DEFAULT_LIMITS
 from mvcodec.encoding.encoder import Encoder
 from mvcodec.errors import SettingError, StreamError
 from mvcodec.stream import Packet, TrackKind
+from mvcodec.video.codecs import CODECS
 
 ARRAY = replace(make_array(48, 32, rows=1), calibration=Calibration(100.0, 100.0, 23.5, 15.5, 0.05))
 Wanted = Callable[[Packet], bool]
@@ -140,7 +141,7 @@ def test_frame_sets_without_a_camera_are_kept_or_dropped(tmp_path: Path) -> None
     assert _findings(clean, tmp_path) == {}
 
 
-@pytest.mark.parametrize("codec", ["h264", "hevc", "av1"])
+@pytest.mark.parametrize("codec", CODECS)
 def test_pictures_that_build_on_a_missing_frame_set_are_left_out(codec: str, tmp_path: Path) -> None:
     sets = coded_sets(codec=codec)
     del sets[5]

@@ -17,6 +17,7 @@ from damage import chunk_ends, small_file
 
 from mvcodec.conformance.validation import validate
 from mvcodec.errors import InputError
+from mvcodec.video.codecs import CODECS
 
 CONFORMANCE = sorted((Path(__file__).parent / "conformance").glob("*.mcap"))
 BIN = Path(sys.executable).parent
@@ -39,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("codec", ["h264", "hevc", "av1"])
+@pytest.mark.parametrize("codec", CODECS)
 def test_what_the_encoder_writes_is_clean(codec: str, tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     path.write_bytes(written(encode(make_array(96, 64, rows=1, cols=2), 12, gop=5, codec=codec)))

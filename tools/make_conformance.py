@@ -97,6 +97,7 @@ CASES: dict[str, Case] = {
     "depth": Case(_calibrated(), (0, 1), {"qp": 34, "depth": True}),
     "hevc": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 30, "codec": "hevc", "gop": 2}),
     "av1": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 40, "codec": "av1", "gop": 2}),
+    "vp9": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 40, "codec": "vp9", "gop": 2}),
     "live": Case(_nominal(1, 2, 32, 32, 10.0), (0, 1, 3, 4, 5), {"qp": 34, "gop": 2}, live=True),
     "principal_points": Case(_calibrated(), (0, 1), {"qp": 40}),
 }

@@ -17,11 +17,12 @@ from mvcodec.capture.video_input import frame_to_rgb
 from mvcodec.container.recorded_pictures import RecordedPicture
 from mvcodec.errors import InputError
 from mvcodec.frames import Picture
+from mvcodec.video.codecs import CODECS
 
 MAX_PIXELS = 1 << 26
 """The largest picture that is taken: twice 8K."""
 
-_DECODERS = {"h264": "h264", "h265": "hevc", "vp9": "vp9", "av1": "libdav1d"}
+_DECODERS = {codec.foxglove: codec.library for codec in CODECS.values()}
 _COMPRESSED = ("JPEG", "PNG", "WEBP")
 _UNREADABLE = (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError)
 """What Pillow raises on damaged pictures."""

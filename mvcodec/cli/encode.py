@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("output", type=local_path, metavar="OUT.mcap", help="or - for standard output")
     rate = parser.add_mutually_exclusive_group()
     rate.add_argument(
-        "--qp", type=int, metavar="N", help=f"constant QP, 1..51, av1 1..63 (default: {default.qp})"
+        "--qp", type=int, metavar="N", help=f"constant QP, 1..51, av1 and vp9 1..63 (default: {default.qp})"
     )
     rate.add_argument("--crf", type=float, metavar="N", help="constant rate factor")
     rate.add_argument(

@@ -17,7 +17,7 @@ from mvcodec.cli.coding_options import add_coding, add_input, checked_config, fi
 from mvcodec.cli.progress import progress
 from mvcodec.errors import MissingExtra, MvCodecWarning, OutputError
 from mvcodec.synthesis.synthesizers import make_synthesizer
-from mvcodec.video.codecs import CODECS
+from mvcodec.video.codecs import ANCHOR_CODECS, CODECS
 
 if TYPE_CHECKING:
     from mvcodec.evaluation.study import Study
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--anchor-codecs",
         type=_names,
         metavar="NAME,..",
-        help=f"codecs of the anchors, some of {', '.join(CODECS)} (default: all)",
+        help=f"codecs of the anchors, some of {', '.join(CODECS)} (default: {', '.join(ANCHOR_CODECS)})",
     )
     add_coding(parser)
     add_synthesizer(parser)
@@ -131,7 +131,7 @@ def _study(array: CameraArray, arguments: argparse.Namespace, range_px: tuple[fl
         config=config,
         synthesizer=arguments.synthesizer,
         anchors=arguments.anchors or tuple(ANCHORS),
-        anchor_codecs=arguments.anchor_codecs or tuple(CODECS),
+        anchor_codecs=arguments.anchor_codecs or ANCHOR_CODECS,
         jobs=arguments.jobs,
     )
 

@@ -19,6 +19,7 @@ from mvcodec.conformance.finding import Finding, error, warning
 from mvcodec.container import schemas
 from mvcodec.errors import StreamError
 from mvcodec.stream import HEADER_TRACK, StreamHeader, Track, TrackKind
+from mvcodec.video.codecs import foxglove_name
 
 _KINDS: dict[str, Any] = {
     "video": CompressedVideo,
@@ -43,7 +44,7 @@ class MessageCheck:
 
     def __init__(self, header: StreamHeader, add: Callable[[Finding], None]) -> None:
         self._add = add
-        self._format = schemas.VIDEO_FORMATS.get(header.codec, header.codec)
+        self._format = foxglove_name(header.codec)
         self._rig = schemas.rig_messages(header.array)
         # Early files have the same principal point in all calibrations, whatever the disparity of infinity.
         same = replace(header.array.calibration, d_inf_px_per_step=0.0)

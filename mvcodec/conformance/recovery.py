@@ -14,9 +14,9 @@ from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.decoding.estimated_maps import can_be_estimated
 from mvcodec.errors import SettingError, StreamError
 from mvcodec.stream import Packet, StreamHeader, Track, TrackKind
-from mvcodec.video.codec import Watch
+from mvcodec.video.codecs import CODECS
 from mvcodec.video.map_size import track_sizes
-from mvcodec.video.reference_watch import WATCHES
+from mvcodec.video.reference_watch import ReferenceWatch
 
 Incomplete = Literal["keep", "drop"]
 
@@ -93,12 +93,12 @@ class _Tracks:
     """
 
     def __init__(self, header: StreamHeader, name: str) -> None:
-        if header.codec not in WATCHES:
-            raise StreamError(name, f"codec {header.codec}", " or ".join(WATCHES))
+        if header.codec not in CODECS:
+            raise StreamError(name, f"codec {header.codec}", " or ".join(CODECS))
         array = header.array
         self._sizes = track_sizes(array.width, array.height, header.disparity_scale)
-        self._codec = header.codec
-        self._watches: dict[Track, Watch] = {}
+        self._codec = CODECS[header.codec]
+        self._watches: dict[Track, ReferenceWatch] = {}
 
     def lose(self, tracks: Iterable[Track]) -> None:
         """Pictures of these tracks are missing."""
@@ -108,12 +108,13 @@ class _Tracks:
     def check(self, packet: Packet, label: str) -> StreamError | None:
         """Why a packet cannot be decoded; None where it can."""
         if packet.keyframe:
-            self._watches[packet.track] = WATCHES[self._codec](self._sizes[packet.track.kind])
+            size = self._sizes[packet.track.kind]
+            self._watches[packet.track] = ReferenceWatch(self._codec, size)
         watch = self._watches.get(packet.track)
         if watch is None:
             return StreamError(label, "a picture that builds on one that is missing", "a keyframe")
         try:
-            watch.push(packet.data, label)
+            watch.push(packet.data, label, packet.index)
         except StreamError as error:
             self.lose([packet.track])
             return error

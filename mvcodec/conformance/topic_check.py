@@ -16,7 +16,7 @@ from mcap.well_known import MessageEncoding
 
 from mvcodec.conformance.file_check import CheckedMessage
 from mvcodec.conformance.finding import Finding, error, warning
-from mvcodec.container.schemas import VIDEO_FORMATS
+from mvcodec.video.codecs import CODECS
 
 VIDEO, POINTS = "foxglove.CompressedVideo", "foxglove.PointCloud"
 
@@ -32,7 +32,7 @@ _MESSAGES: dict[str, Any] = {
     _TRANSFORM: FrameTransform,
     _TRANSFORMS: FrameTransforms,
 }
-_CODECS = {name: codec for codec, name in VIDEO_FORMATS.items()}
+_NAMES = {codec.foxglove: name for name, codec in CODECS.items()}
 
 _Type = PackedElementField.NumericType
 _BYTES = {
@@ -125,11 +125,11 @@ class TopicCheck:
             self._add(error("frame-id", text, topic, time_ns))
 
     def _video(self, parsed: Any, where: tuple[str, int]) -> tuple[str, bytes] | None:
-        if parsed.format not in _CODECS:
-            text = f"format {parsed.format!r}, expected one of {', '.join(_CODECS)}"
+        if parsed.format not in _NAMES:
+            text = f"format {parsed.format!r}, expected one of {', '.join(_NAMES)}"
             self._add(error("format", text, *where))
             return None
-        return _CODECS[parsed.format], parsed.data
+        return _NAMES[parsed.format], parsed.data
 
     def _points(self, parsed: Any, where: tuple[str, int]) -> None:
         stride = parsed.point_stride

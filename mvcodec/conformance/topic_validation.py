@@ -5,7 +5,8 @@ from __future__ import annotations
 from mvcodec.conformance.file_check import CheckedMessage, FileCheck
 from mvcodec.conformance.finding import Finding, error
 from mvcodec.conformance.topic_check import TopicCheck
-from mvcodec.conformance.unit_rules import UNIT_RULES, UnitRules
+from mvcodec.conformance.unit_rules import UnitRules
+from mvcodec.video.codecs import CODECS
 
 _SECOND_NS = 1_000_000_000
 _ANY_SIZE = (0, 0)
@@ -29,7 +30,7 @@ class TopicValidation:
         topic, time_ns = message.topic, message.record.log_time
         rules = self._rules.get((topic, codec))
         if rules is None:
-            rules = self._rules[topic, codec] = UNIT_RULES[codec](None, _ANY_SIZE)
+            rules = self._rules[topic, codec] = UnitRules(CODECS[codec], None, _ANY_SIZE)
         for code, text in rules.push(data, None):
             self.findings.append(error(code, text, topic, time_ns))
         if rules.keyframe:

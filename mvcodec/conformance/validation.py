@@ -13,12 +13,13 @@ from mvcodec.conformance.finding import Finding, error, warning
 from mvcodec.conformance.message_check import MessageCheck
 from mvcodec.conformance.topic_check import POINTS, VIDEO
 from mvcodec.conformance.topic_validation import TopicValidation
-from mvcodec.conformance.unit_rules import UNIT_RULES, UnitRules
+from mvcodec.conformance.unit_rules import UnitRules
 from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.declared import METADATA_NAME
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.errors import InputError, StreamError
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track
+from mvcodec.video.codecs import CODECS
 from mvcodec.video.map_size import track_sizes
 
 MAX_FINDINGS = 1000
@@ -191,12 +192,12 @@ class _StreamCheck:
         self._header, self._header_data = header, data
         self._messages = MessageCheck(header, self._add)
         sizes = track_sizes(header.array.width, header.array.height, header.disparity_scale)
-        rules = UNIT_RULES.get(header.codec)
-        if rules is None:
+        codec = CODECS.get(header.codec)
+        if codec is None:
             self._add(error("codec", f"unknown codec {header.codec!r}", HEADER_TRACK.topic))
+        else:
+            self._rules = {track: UnitRules(codec, track.kind, sizes[track.kind]) for track in header.tracks}
         self._tracks = {track.topic: track for track in header.tracks}
-        if rules is not None:
-            self._rules = {track: rules(track.kind, sizes[track.kind]) for track in header.tracks}
         self._assembler.start(header.tracks)
 
     def _check_set(self, message: CheckedMessage) -> None:
@@ -231,7 +232,7 @@ class _StreamCheck:
             text = f"{since_s:.3f} s after the last keyframe, expected one each second"
             self._add(error("keyframe-interval", text, track.topic, record.log_time))
         if track in self._rules:
-            for code, text in self._rules[track].push(data, keyframe):
+            for code, text in self._rules[track].push(data, keyframe, record.sequence):
                 self._add(error(code, text, track.topic, record.log_time))
         self._tell_sets(self._assembler.push(packet))
 

@@ -18,6 +18,7 @@ from mcap_protobuf.schema import build_file_descriptor_set
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.errors import StreamError
 from mvcodec.stream import Packet, view_name
+from mvcodec.video.codecs import foxglove_name
 
 RIG_FRAME = "rig"
 """Root frame: x forward, y left, z up (REP 103), at camera (0, 0)."""
@@ -66,9 +67,6 @@ DEPTH_SCHEMA = (
 """The same of depth, which few files have."""
 
 DEPTH_ENCODING = "16UC1"
-
-VIDEO_FORMATS = {"h264": "h264", "hevc": "h265", "av1": "av1"}
-"""The header's name of a codec -> foxglove.CompressedVideo's; a name not listed is itself."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,7 +130,7 @@ def video_message(packet: Packet, codec: str) -> bytes:
 
 def compressed_video(frame: str, time_ns: int, data: bytes, codec: str) -> bytes:
     """A serialised foxglove.CompressedVideo."""
-    message = CompressedVideo(frame_id=frame, data=data, format=VIDEO_FORMATS.get(codec, codec))
+    message = CompressedVideo(frame_id=frame, data=data, format=foxglove_name(codec))
     message.timestamp.FromNanoseconds(time_ns)
     serialised: bytes = message.SerializeToString()
     return serialised
@@ -187,7 +185,7 @@ def video_data(message: bytes, source: str, codec: str) -> bytes:
         parsed = CompressedVideo.FromString(message)
     except DecodeError as error:
         raise StreamError(source, f"a damaged message ({error})", "foxglove.CompressedVideo") from None
-    expected = VIDEO_FORMATS.get(codec, codec)
+    expected = foxglove_name(codec)
     if parsed.format != expected:
         raise StreamError(source, f"video of format {parsed.format!r}", f"{expected!r}, as the header says")
     data: bytes = parsed.data

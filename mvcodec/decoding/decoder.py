@@ -283,7 +283,11 @@ class Decoder(Closing):
         assert self._pool is not None
         jobs: dict[Track, Future[Planes]] = {
             track: self._pool.submit(
-                self._decoders[track].push, packet.data, packet.keyframe, self._assembler.label(packet)
+                self._decoders[track].push,
+                packet.data,
+                packet.keyframe,
+                self._assembler.label(packet),
+                packet.index,
             )
             for track, packet in packets.packets.items()
         }

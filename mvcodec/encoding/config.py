@@ -36,7 +36,7 @@ class EncoderConfig:
     """Settings of an encoder, checked here.
 
     Attributes:
-        qp: constant quantiser of the pictures, 1..51 (codec av1: 1..63); None where crf or
+        qp: constant quantiser of the pictures, 1..51 (codecs av1 and vp9: 1..63); None where crf or
             bitrate_kbps governs.
         crf: constant quality of the pictures, on the same scale.
         bitrate_kbps: average of all video tracks together, kbit/s.

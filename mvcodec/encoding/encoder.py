@@ -62,6 +62,7 @@ class Encoder:
     ) -> None:
         self.array = array
         self.config = config or EncoderConfig()
+        self._codec = find_codec(self.config.codec)
         longest = default_gop(array.fps)
         self._gop = self.config.gop or longest
         if self._gop > longest:
@@ -106,6 +107,8 @@ class Encoder:
         position, self._position = self._position, 0
         if self._last is not None and frames.time_ns - self._key_ns >= KEYFRAME_NS:
             position = 0  # frame sets came more slowly than their nominal rate
+        if self._last is not None and frames.index != self._last.index + 1 and not self._codec.numbered:
+            position = 0  # else what was left out would look like what was lost
         jobs: dict[Track, Future[list[CodedPicture]]] = {}
         try:
             self._submit(self._pool, frames, position == 0, jobs)
@@ -166,9 +169,8 @@ class Encoder:
     def _make_encoders(
         self, kind: TrackKind, cameras: tuple[Position, ...], size: tuple[int, int], rate: RateControl
     ) -> dict[Track, VideoEncoder]:
-        codec = find_codec(self.config.codec)
         settings = VideoSettings(kind, *size, self.array.fps, self._gop, rate, self.config.preset)
-        return {Track(kind, camera): codec.encoder(settings) for camera in cameras}
+        return {Track(kind, camera): self._codec.encoder(settings) for camera in cameras}
 
     def _make_map_encoders(self, header: StreamHeader) -> dict[Track, VideoEncoder]:
         if not header.map_cameras:
@@ -189,7 +191,7 @@ class Encoder:
         return StreamHeader(self.array, span, codec, frames.index, settings, self._scale, cameras)
 
     def _settings_record(self, maps: RateControl | None) -> dict[str, Any]:
-        config, codec = self.config, find_codec(self.config.codec)
+        config, codec = self.config, self._codec
         matcher = config.matcher if isinstance(config.matcher, str) else type(config.matcher).__name__
         record = {
             "qp": config.qp,

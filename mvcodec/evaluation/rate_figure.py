@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from mvcodec.evaluation.figures import METRICS, Document, look, own_curve
+from mvcodec.video.codecs import CODECS
 
 # Okabe and Ito's palette (2008).
 OURS_COLOURS = ("#D55E00", "#000000", "#E69F00", "#8C510A")
@@ -25,7 +27,9 @@ ANCHOR_STYLES = {
 ANCHOR_FACES = ("white", None, "#666666", "#d9d9d9")
 """Fill of the markers of one anchor's curves that differ between reports; None is the curve's colour."""
 
-CODEC_LINES: dict[str, Any] = {"h264": "-", "hevc": (0, (5, 1.5)), "av1": (0, (1, 1.2))}
+_LINES = ("-", (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
+CODEC_LINES: dict[str, Any] = dict(zip(CODECS, itertools.cycle(_LINES), strict=False))
+"""Key of CODECS -> how its curves are drawn."""
 
 CLASSES = {"all": "all views", "virtual": "virtual views"}
 

@@ -26,16 +26,10 @@ from mvcodec.evaluation.points import BitsSplit, CurvePoint, PointStore
 from mvcodec.evaluation.remembered import MapSpool, Remembered
 from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codec import RateControl
-from mvcodec.video.codecs import CODECS, find_codec
+from mvcodec.video.codecs import ANCHOR_CODECS, CODECS, find_codec
 from mvcodec.video.pyav import library_versions
 
 OURS = "mvcodec"
-
-CODEC_NAMES = {"h264": "H.264", "hevc": "HEVC", "av1": "AV1"}
-
-AV1_SLOPE, AV1_OFFSET = 2.4, -30.0
-"""SVT-AV1's QP that gives the luma PSNR of libx264's QP: a line through what was measured on shop_v4
-(simulcast, preset slow): 22, 27, 32, 37 have the quality of 23, 38, 49, 58."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +52,7 @@ class Study:
     config: EncoderConfig
     synthesizer: str
     anchors: tuple[str, ...] = tuple(ANCHORS)
-    anchor_codecs: tuple[str, ...] = tuple(CODECS)
+    anchor_codecs: tuple[str, ...] = ANCHOR_CODECS
     jobs: int = 1
 
     def __post_init__(self) -> None:
@@ -107,17 +101,15 @@ class Curve:
     def label(self) -> str:
         """For legends and tables."""
         what = OURS if self.anchor is None else self.anchor.title
-        return f"{what}, {CODEC_NAMES[self.codec]}"
+        return f"{what}, {CODECS[self.codec].title}"
 
 
 def translate_qps(qps: tuple[int, ...], source: str, target: str) -> tuple[int, ...]:
     """The QPs of another codec that come closest in quality, without repetition."""
-    if (source == "av1") == (target == "av1"):
+    (from_slope, from_offset), (slope, offset) = find_codec(source).qp_line, find_codec(target).qp_line
+    if (from_slope, from_offset) == (slope, offset):
         return qps
-    if target == "av1":
-        found = [AV1_SLOPE * qp + AV1_OFFSET for qp in qps]
-    else:
-        found = [(qp - AV1_OFFSET) / AV1_SLOPE for qp in qps]
+    found = [slope * (qp - from_offset) / from_slope + offset for qp in qps]
     top = find_codec(target).max_qp
     return tuple(dict.fromkeys(min(max(round(qp), 1), top) for qp in found))
 

@@ -13,6 +13,11 @@ _USER_DATA_UNREGISTERED = 5
 _START = b"\x00\x00\x01"
 
 
+def begins_with_start_code(data: bytes) -> bool:
+    """Whether an access unit is in Annex B form."""
+    return data.startswith((_START, b"\x00" + _START))
+
+
 def nal_units(data: bytes) -> list[bytes]:
     """The NAL units of an access unit, without start codes and trailing zeros."""
     starts = []

@@ -5,10 +5,19 @@ from __future__ import annotations
 import os
 
 from mvcodec.stream import TrackKind
-from mvcodec.video.codec import PRESETS, VideoDecoder, VideoEncoder, VideoSettings
+from mvcodec.video.access_unit import UnitWords
+from mvcodec.video.av1_syntax import Av1Units
+from mvcodec.video.codec import PRESETS, Codec, VideoDecoder, VideoEncoder, VideoSettings
+from mvcodec.video.map_model import AOM
 from mvcodec.video.pyav import PyavDecoder, PyavEncoder
 
 MAX_QP = 63
+
+DECODER = "libdav1d"
+
+QP_LINE = 2.4, -30.0
+"""SVT-AV1's QP that gives the luma PSNR of libx264's QP: a line through what was measured on shop_v4
+(simulcast, preset slow): 22, 27, 32, 37 have the quality of 23, 38, 49, 58."""
 
 SVT_PRESETS = dict(zip(PRESETS, (12, 11, 10, 9, 8, 6, 4, 3, 2, 1), strict=True))
 """SVT-AV1's numbers for the efforts that x264 and x265 have names for; medium and slow take about
@@ -28,6 +37,15 @@ SVT_PARAMS = {
 """tune=1 is PSNR: the counterpart of x264's psy=0."""
 
 
+WORDS = UnitWords(
+    unit="an AV1 temporal unit",
+    part="OBU",
+    keyframe="key frame",
+    parameters="sequence header",
+    profile="Main: 8 bits, 4:2:0",
+)
+
+
 def av1_settings(kind: TrackKind) -> str:
     """SVT-AV1's parameters for a kind of track, beyond preset and rate."""
     return SVT_PARAMS[kind]
@@ -41,7 +59,7 @@ def av1_encoder(settings: VideoSettings) -> VideoEncoder:
 
 def av1_decoder(low_delay: bool = True) -> VideoDecoder:
     """dav1d."""
-    return PyavDecoder("libdav1d", "an AV1 temporal unit", low_delay)
+    return PyavDecoder(DECODER, WORDS.unit, low_delay)
 
 
 def av1_options(settings: VideoSettings) -> dict[str, str]:
@@ -60,3 +78,19 @@ def av1_options(settings: VideoSettings) -> dict[str, str]:
         params += ":rc=2"
         options |= {"maxrate": options["b"], "bufsize": str(2 * int(options["b"]))}
     return {**options, "svtav1-params": params}
+
+
+AV1 = Codec(
+    title="AV1",
+    foxglove="av1",
+    encoder=av1_encoder,
+    decoder=av1_decoder,
+    library=DECODER,
+    settings=av1_settings,
+    options=av1_options,
+    max_qp=MAX_QP,
+    qp_line=QP_LINE,
+    maps=AOM,
+    units=Av1Units,
+    words=WORDS,
+)

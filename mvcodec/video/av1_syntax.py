@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from mvcodec.video.access_unit import Colour, Sequence, UnitFacts
 from mvcodec.video.bits import BitReader, NalError
 
 SEQUENCE_HEADER, FRAME_HEADER, FRAME = 1, 3, 6
@@ -12,6 +13,14 @@ SEQUENCE_HEADER, FRAME_HEADER, FRAME = 1, 3, 6
 
 KEY_FRAME = 0
 _SWITCH_FRAME = 3
+_HIGH, _PROFESSIONAL = 1, 2
+"""seq_profile (6.4.1)."""
+
+_SRGB = (1, 13, 0)
+"""Code points of colour whose range is not sent."""
+
+_NOT_STARTED = "a picture before the first keyframe"
+
 _SELECTED = 2
 """seq_force_screen_content_tools, seq_force_integer_mv: each frame says."""
 
@@ -21,15 +30,19 @@ _HEAD_BYTES = 64
 
 @dataclass(frozen=True, slots=True)
 class Av1Sequence:
-    """A sequence header, as far as frame headers up to their order hint need it.
+    """A sequence header: what frame headers up to their order hint need, and what it says of pictures.
 
     Attributes:
+        size: (width, height), px.
+        facts: profile and colour.
         time_bits: of frame_presentation_time; 0 where frames have none.
         id_bits: of current_frame_id; 0 where frames have none.
         screen_content, integer_motion: seq_force_screen_content_tools, seq_force_integer_mv.
         order_bits: of order_hint; 0 where frames have none.
     """
 
+    size: tuple[int, int]
+    facts: Sequence
     time_bits: int
     id_bits: int
     screen_content: int
@@ -64,56 +77,76 @@ def obus(data: bytes) -> Iterator[tuple[int, bytes]]:
         at += size
 
 
-class Av1References:
-    """Follows the order hints of a track's frames, which FORMAT.md has count up by one.
+class Av1Units:
+    """Reads temporal units: their rules, and their order hints, which FORMAT.md has count up by one.
 
     Frame headers name the slots that they build on, not the frames in there: a frame that is missing
     shows by its number only.
-
-    Attributes:
-        key_frame: the last unit holds one.
     """
 
     def __init__(self) -> None:
         self._sequence: Av1Sequence | None = None
         self._last: int | None = None
         self._started = False
-        self.key_frame = False
 
-    def push(self, data: bytes) -> str | None:
-        """Follow one temporal unit; returns what is missing, if anything is.
-
-        Raises:
-            NalError: a unit that breaks off.
-        """
-        missing, self.key_frame = None, False
+    def push(self, data: bytes) -> UnitFacts:
+        """See `UnitReader`."""
+        sequences, broken, missing, keyframe, pictures = [], [], None, False, 0
         for kind, content in obus(data):
             if kind == SEQUENCE_HEADER:
-                self._sequence = _sequence(BitReader(content))
+                self._sequence = parse_sequence(BitReader(content))
+                sequences.append(self._sequence)
             elif kind in (FRAME_HEADER, FRAME):
+                pictures += 1
                 if self._sequence is None:
-                    return "a picture before the first keyframe"
-                missing = self._frame(self._sequence, BitReader(content[:_HEAD_BYTES])) or missing
-        return missing
+                    missing = _NOT_STARTED
+                    continue
+                bits = BitReader(content[:_HEAD_BYTES])
+                if bits.flag():  # show_existing_frame
+                    continue
+                frame = _frame_head(self._sequence, bits)
+                keyframe |= frame.kind == KEY_FRAME
+                missing = self._follow(self._sequence, frame) or missing
+                if not frame.shown:
+                    broken.append(("hidden", "a frame that is not shown"))
+                if frame.resized:
+                    broken.append(("size", "a frame with a size of its own (frame_size_override_flag)"))
+        return UnitFacts(
+            keyframe=keyframe,
+            pictures=pictures,
+            parameters=bool(sequences),
+            sizes=tuple(sequence.size for sequence in sequences),
+            sequences=tuple(sequence.facts for sequence in sequences),
+            broken=tuple(broken),
+            missing=missing,
+        )
 
-    def _frame(self, sequence: Av1Sequence, bits: BitReader) -> str | None:
-        if bits.flag():  # show_existing_frame
-            return None
-        kind, order = _frame_order(sequence, bits)
-        last, self._last = self._last, order
-        if kind == KEY_FRAME:
-            self._started = self.key_frame = True
+    def _follow(self, sequence: Av1Sequence, frame: _FrameHead) -> str | None:
+        """What is missing before a frame, if anything is."""
+        last, self._last = self._last, frame.order
+        if frame.kind == KEY_FRAME:
+            self._started = True
             return None
         if not self._started:
-            return "a picture before the first keyframe"
+            return _NOT_STARTED
         if not sequence.order_bits or last is None:
             return None
         expected = (last + 1) % (1 << sequence.order_bits)
-        return None if order == expected else f"order_hint {order}, expected {expected}"
+        return None if frame.order == expected else f"order_hint {frame.order}, expected {expected}"
 
 
-def _frame_order(sequence: Av1Sequence, bits: BitReader) -> tuple[int, int]:
-    """frame_type and order_hint of a frame header (5.9.2) behind show_existing_frame."""
+@dataclass(frozen=True, slots=True)
+class _FrameHead:
+    """frame_type, show_frame, frame_size_override_flag and order_hint."""
+
+    kind: int
+    shown: bool
+    resized: bool
+    order: int
+
+
+def _frame_head(sequence: Av1Sequence, bits: BitReader) -> _FrameHead:
+    """A frame header (5.9.2) behind show_existing_frame, up to its order hint."""
     kind, shown = bits.u(2), bits.flag()
     if shown:
         bits.u(sequence.time_bits)
@@ -126,19 +159,23 @@ def _frame_order(sequence: Av1Sequence, bits: BitReader) -> tuple[int, int]:
     if screen and sequence.integer_motion == _SELECTED:
         bits.flag()
     bits.u(sequence.id_bits)
-    if kind != _SWITCH_FRAME:
-        bits.flag()  # frame_size_override_flag
-    return kind, bits.u(sequence.order_bits)
+    resized = kind == _SWITCH_FRAME or bits.flag()
+    return _FrameHead(kind, shown, resized, bits.u(sequence.order_bits))
 
 
-def _sequence(bits: BitReader) -> Av1Sequence:
-    """sequence_header_obu (5.5.1). Reduced still pictures, which no video is made of, are refused."""
-    bits.u(4)
+def parse_sequence(bits: BitReader) -> Av1Sequence:
+    """sequence_header_obu (5.5.1).
+
+    Raises:
+        NalError: it breaks off, or is of reduced still pictures, which no video is made of.
+    """
+    profile = bits.u(3)
+    bits.flag()  # still_picture
     if bits.flag():
         raise NalError("a sequence of one still picture")
     time_bits = _timing_and_points(bits)
-    widths = bits.u(4) + 1, bits.u(4) + 1
-    bits.u(sum(widths))
+    across, down = bits.u(4) + 1, bits.u(4) + 1
+    size = bits.u(across) + 1, bits.u(down) + 1
     id_bits = 0
     if bits.flag():
         id_bits = bits.u(4) + 2
@@ -152,7 +189,21 @@ def _sequence(bits: BitReader) -> Av1Sequence:
     motion = _SELECTED
     if screen and not bits.flag():
         motion = bits.u(1)
-    return Av1Sequence(time_bits, id_bits, screen, motion, bits.u(3) + 1 if has_order else 0)
+    order_bits = bits.u(3) + 1 if has_order else 0
+    bits.u(3)  # super-resolution, CDEF and restoration
+    return Av1Sequence(size, _colour(bits, profile), time_bits, id_bits, screen, motion, order_bits)
+
+
+def _colour(bits: BitReader, profile: int) -> Sequence:
+    """color_config (5.5.2), up to the range."""
+    deep = bits.flag()
+    if profile == _PROFESSIONAL and deep:
+        bits.flag()  # 12 bits
+    grey = profile != _HIGH and bits.flag()
+    points = (bits.u(8), bits.u(8), bits.u(8)) if bits.flag() else (None, None, None)
+    full = True if points == _SRGB and not grey else bits.flag()
+    wrong = [f"seq_profile {profile}"] * (profile != 0) + ["more than 8 bits"] * deep + ["monochrome"] * grey
+    return Sequence(", ".join(wrong) or None, None, Colour(full, *points))
 
 
 def _timing_and_points(bits: BitReader) -> int:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from mvcodec.errors import SettingError
 from mvcodec.stream import TrackKind
+from mvcodec.video.access_unit import UnitReader, UnitWords
+from mvcodec.video.map_model import MapModel
 
 Plane = NDArray[np.uint8]
 
@@ -28,7 +30,7 @@ PRESETS = (
 )
 
 WIDEST_SCALE = 63
-"""The highest QP of any codec (AV1's)."""
+"""The highest QP of any codec (AV1's and VP9's)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,30 +178,39 @@ class DecoderFactory(Protocol):
         ...
 
 
-class Watch(Protocol):
-    """Looks at a track's access units before the decoder does."""
-
-    def push(self, data: bytes, label: str) -> None:
-        """Raise StreamError where the decoder would conceal damage or take too much memory."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class Codec:
-    """A stock video codec.
+    """A stock video codec: all in which it differs from the others.
 
     Attributes:
+        title: for people.
+        foxglove: foxglove.CompressedVideo's name of it.
         encoder: makes the encoder of one track.
         decoder: makes the decoder of one track.
+        library: libavcodec's name of that decoder.
         settings: the codec's own settings for a kind of track, for the record in the header.
         options: all options that its encoder is given, by name.
         max_qp: the coarsest of its quantisers; the finest is 1.
-        watch: (width, height) -> what looks for damage that the decoder does not report.
+        qp_line: (slope, offset): ``slope * qp + offset`` has the luma PSNR of libx264's qp.
+        maps: what maps are coded with.
+        units: makes the reader of one track's access units.
+        words: for messages.
+        numbered: its pictures tell whether one before them is missing. Where they don't, frame sets
+            count up by one between keyframes.
+        anchor: simulcast and PVS are measured with it unless others are asked for.
     """
 
+    title: str
+    foxglove: str
     encoder: Callable[[VideoSettings], VideoEncoder]
     decoder: DecoderFactory
+    library: str
     settings: Callable[[TrackKind], str]
     options: Callable[[VideoSettings], dict[str, str]]
     max_qp: int
-    watch: Callable[[tuple[int, int]], Watch]
+    qp_line: tuple[float, float]
+    maps: MapModel
+    units: Callable[[], UnitReader]
+    words: UnitWords
+    numbered: bool = True
+    anchor: bool = True

@@ -1,38 +1,19 @@
-"""The table of video codecs."""
+"""The table of video codecs. What is particular to one stands in its own file."""
 
 from __future__ import annotations
 
 from mvcodec.errors import SettingError
-from mvcodec.video import av1, h264, hevc
+from mvcodec.video.av1 import AV1
 from mvcodec.video.codec import Codec
-from mvcodec.video.reference_watch import WATCHES
+from mvcodec.video.h264 import H264
+from mvcodec.video.hevc import HEVC
+from mvcodec.video.vp9 import VP9
 
-CODECS: dict[str, Codec] = {
-    "h264": Codec(
-        h264.h264_encoder,
-        h264.h264_decoder,
-        h264.h264_settings,
-        h264.h264_options,
-        h264.MAX_QP,
-        WATCHES["h264"],
-    ),
-    "hevc": Codec(
-        hevc.hevc_encoder,
-        hevc.hevc_decoder,
-        hevc.hevc_settings,
-        hevc.hevc_options,
-        hevc.MAX_QP,
-        WATCHES["hevc"],
-    ),
-    "av1": Codec(
-        av1.av1_encoder,
-        av1.av1_decoder,
-        av1.av1_settings,
-        av1.av1_options,
-        av1.MAX_QP,
-        WATCHES["av1"],
-    ),
-}
+CODECS: dict[str, Codec] = {"h264": H264, "hevc": HEVC, "av1": AV1, "vp9": VP9}
+"""By the name that headers and settings have."""
+
+
+ANCHOR_CODECS = tuple(name for name, codec in CODECS.items() if codec.anchor)
 
 
 def find_codec(name: str) -> Codec:
@@ -40,3 +21,8 @@ def find_codec(name: str) -> Codec:
     if name not in CODECS:
         raise SettingError("codec", name, ", ".join(CODECS))
     return CODECS[name]
+
+
+def foxglove_name(name: str) -> str:
+    """foxglove.CompressedVideo's name of a codec; of one that is not in the table, its own."""
+    return CODECS[name].foxglove if name in CODECS else name

@@ -32,48 +32,12 @@ moebius; 3 QPs more at QP 32 and 37 cost up to 3.6 %. Hence 5 more at QP 28 and 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from mvcodec.array import CameraArray
 from mvcodec.video.codecs import find_codec
 
-
-@dataclass(frozen=True, slots=True)
-class MapModel:
-    """What maps are coded with, from the pictures' QP or CRF, all on the codec's own scale.
-
-    Attributes:
-        half_from: the QP from which on maps are coded at half size each way, and only every second
-            camera of an array sends one.
-        full: map QP less picture QP for maps of full size whose range is at most REFERENCE_PX wide.
-        half: the same for maps of half size.
-        alternate: added where only every second camera sends a map.
-        fine_extra: added where all cameras do, at half size, and pictures are fine: all of it up to
-            QP FINE_UNTIL less this, nothing from FINE_UNTIL on.
-        octave: what doubles the quantiser's step. A range twice as wide makes a code value worth twice
-            the pixels, so the map QP falls by this.
-    """
-
-    half_from: float
-    full: int
-    half: int
-    alternate: int
-    fine_extra: int
-    octave: int
-
-
 REFERENCE_PX = 64.0
 """Range of disparities, between neighbouring real cameras, up to which the models' offsets hold."""
-
-H26X = MapModel(half_from=25, full=5, half=0, alternate=-2, fine_extra=5, octave=6)
-
-# x265's QPs have the steps of x264's: at QP 32 the model's choice is on the hull of both sets tried.
-# SVT-AV1's are 2.4 times as close; nobody has measured them.
-MODELS = {
-    "h264": H26X,
-    "hevc": H26X,
-    "av1": MapModel(half_from=30, full=12, half=0, alternate=-5, fine_extra=0, octave=14),
-}
 
 FINE_UNTIL = 33
 """The QP from which on pictures are too coarse for `fine_extra`."""
@@ -93,14 +57,14 @@ def default_disparity_scale(quality: float | None, codec: str, width: int, heigh
     """1 or 2, as `StreamHeader.disparity_scale`; quality is None where a bit rate governs."""
     if min(width, height) < SMALLEST_HALVED:
         return 1
-    return 2 if quality is None or quality >= MODELS[codec].half_from else 1
+    return 2 if quality is None or quality >= find_codec(codec).maps.half_from else 1
 
 
 def default_disparity_cameras(quality: float | None, codec: str, array: CameraArray) -> str:
     """One of DISPARITY_CAMERAS; quality is None where a bit rate governs."""
     if min(len(array.real_rows), len(array.real_cols)) < FEWEST_EACH_WAY:
         return "all"
-    return "alternate" if quality is None or quality >= MODELS[codec].half_from else "all"
+    return "alternate" if quality is None or quality >= find_codec(codec).maps.half_from else "all"
 
 
 def best_disparity_cameras(quality: float | None, codec: str, array: CameraArray) -> str:
@@ -120,7 +84,7 @@ def default_disparity_qp(
         cameras: as `StreamHeader.disparity_cameras`.
         range_px: (lo, hi), as `StreamHeader.disparity_range_px`.
     """
-    model = MODELS[codec]
+    model = find_codec(codec).maps
     octaves = math.log2((range_px[1] - range_px[0]) / REFERENCE_PX)
     offset = (model.half if scale == 2 else model.full) - model.octave * min(max(octaves, 0), MOST_OCTAVES)
     if cameras == "alternate":

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from mvcodec.stream import TrackKind
+from mvcodec.video.access_unit import UnitWords
 from mvcodec.video.annexb import without_user_data
-from mvcodec.video.codec import VideoDecoder, VideoEncoder, VideoSettings
+from mvcodec.video.codec import Codec, VideoDecoder, VideoEncoder, VideoSettings
+from mvcodec.video.h264_syntax import H264Units
+from mvcodec.video.map_model import H26X
 from mvcodec.video.pyav import PyavDecoder, PyavEncoder
 
 MAX_QP = 51
+
+DECODER = "h264"
 
 # No packet may wait for a later picture: no B-frames, no look-ahead, and no variable frame rate
 # (force-cfr), which alone holds one picture back.
@@ -25,6 +30,15 @@ X264_PARAMS = {
 }
 
 
+WORDS = UnitWords(
+    unit="an H.264 access unit",
+    part="NAL unit",
+    keyframe="IDR picture",
+    parameters="SPS and PPS",
+    profile="High or lower, 8 bits, 4:2:0, progressive",
+)
+
+
 def h264_settings(kind: TrackKind) -> str:
     """x264's parameters for a kind of track, beyond preset and rate."""
     return X264_PARAMS[kind]
@@ -39,7 +53,7 @@ def h264_encoder(settings: VideoSettings) -> VideoEncoder:
 
 def h264_decoder(low_delay: bool = True) -> VideoDecoder:
     """FFmpeg's own decoder."""
-    return PyavDecoder("h264", "an H.264 access unit", low_delay)
+    return PyavDecoder(DECODER, WORDS.unit, low_delay)
 
 
 def h264_options(settings: VideoSettings) -> dict[str, str]:
@@ -57,3 +71,19 @@ def h264_options(settings: VideoSettings) -> dict[str, str]:
         "x264-params": params,
         **settings.rate.options(),
     }
+
+
+H264 = Codec(
+    title="H.264",
+    foxglove="h264",
+    encoder=h264_encoder,
+    decoder=h264_decoder,
+    library=DECODER,
+    settings=h264_settings,
+    options=h264_options,
+    max_qp=MAX_QP,
+    qp_line=(1.0, 0.0),
+    maps=H26X,
+    units=H264Units,
+    words=WORDS,
+)

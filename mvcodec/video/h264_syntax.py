@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mvcodec.video.annexb import IDR_SLICE, PPS, SLICE, SPS, nal_type, nal_units
+from mvcodec.video.access_unit import Colour, Sequence, UnitFacts
+from mvcodec.video.annexb import IDR_SLICE, PPS, SLICE, SPS, begins_with_start_code, nal_type, nal_units
 from mvcodec.video.bits import BitReader, NalError, payload
 
 _HIGH_PROFILES = frozenset({100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135})
@@ -20,23 +21,15 @@ P_SLICE, B_SLICE, I_SLICE = 0, 1, 2
 MAX_PARAMETER_SET_BYTES = 4096
 """A parameter set has some tens of bytes; a longer one is damage."""
 
+PLAIN_PROFILES = frozenset({66, 77, 88, 100})
+"""profile_idc up to High: 8 bits, 4:2:0, decoded everywhere."""
+
+_PARTITIONS = frozenset({2, 3, 4})
+_NO_REORDERING = 2
+"""pic_order_cnt_type of streams in the order of display."""
+
 MAX_CYCLE = 255
 """num_ref_frames_in_pic_order_cnt_cycle, at most (7.4.2.1.1)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Colour:
-    """What the VUI says of colour; None where it says nothing.
-
-    Attributes:
-        full_range: video_full_range_flag.
-        primaries, transfer, matrix: as in ITU-T H.273; 1 is BT.709.
-    """
-
-    full_range: bool
-    primaries: int | None
-    transfer: int | None
-    matrix: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +150,52 @@ class H264Parser:
         """MaxFrameNum for a slice: its frame_num counts modulo this; None where it is not known."""
         sequence = self._sequences.get(self._pictures.get(piece.picture_set, -1))
         return None if sequence is None else 1 << sequence.frame_num_bits
+
+
+class H264Units:
+    """Reads access units: their rules, and their frame_num (7.4.3)."""
+
+    def __init__(self) -> None:
+        self._parser = H264Parser()
+        self._next: int | None = None
+
+    def push(self, data: bytes) -> UnitFacts:
+        """See `UnitReader`."""
+        unit = self._parser.push(data)
+        broken = [] if begins_with_start_code(data) else [("annex-b", "no start code at its beginning")]
+        if any(piece.kind == B_SLICE for piece in unit.slices):
+            broken.append(("b-frames", "a B slice"))
+        if _PARTITIONS & set(unit.kinds):
+            broken.append(("partition", "data partitions"))
+        missing = None
+        for piece in (piece for piece in unit.slices if piece.first_block == 0):
+            top = self._parser.frame_num_range(piece)
+            if top is None or piece.frame_num is None:
+                broken.append(("parameter-sets", "a slice whose parameter sets never came"))
+                continue
+            if not piece.idr and self._next is None:
+                missing = "a picture before the first keyframe"
+            elif not piece.idr and piece.frame_num != self._next:
+                missing = f"frame_num {piece.frame_num}, expected {self._next}"
+            self._next = (piece.frame_num + 1) % top if piece.reference else piece.frame_num
+        return UnitFacts(
+            keyframe=unit.idr,
+            pictures=unit.pictures,
+            parameters={SPS, PPS} <= set(unit.kinds),
+            sizes=tuple((found.width, found.height) for found in unit.sequence_sets),
+            sequences=tuple(map(_facts, unit.sequence_sets)),
+            broken=tuple(broken),
+            missing=missing,
+        )
+
+
+def _facts(found: SequenceParameters) -> Sequence:
+    plain = found.chroma_format == 1 and found.bit_depth == 8 and found.progressive
+    unlike = None if plain and found.profile in PLAIN_PROFILES else f"profile_idc {found.profile}"
+    reordered = None
+    if found.order_type != _NO_REORDERING and found.reorder != 0:
+        reordered = "no pic_order_cnt_type 2, no max_num_reorder_frames 0"
+    return Sequence(unlike, reordered, found.colour)
 
 
 def parse_sequence(unit: bytes) -> SequenceParameters:

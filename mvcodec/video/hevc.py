@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from mvcodec.stream import TrackKind
-from mvcodec.video.codec import VideoDecoder, VideoEncoder, VideoSettings
+from mvcodec.video.access_unit import UnitWords
+from mvcodec.video.codec import Codec, VideoDecoder, VideoEncoder, VideoSettings
+from mvcodec.video.hevc_syntax import HevcUnits
+from mvcodec.video.map_model import H26X
 from mvcodec.video.pyav import PyavDecoder, PyavEncoder
 
 MAX_QP = 51
+
+DECODER = "hevc"
 
 _AT_ONCE = "bframes=0:rc-lookahead=0"
 
@@ -22,6 +27,15 @@ X265_PARAMS = {
 }
 
 
+WORDS = UnitWords(
+    unit="an HEVC access unit",
+    part="NAL unit",
+    keyframe="IDR picture",
+    parameters="VPS, SPS and PPS",
+    profile="Main: 8 bits, 4:2:0, progressive",
+)
+
+
 def hevc_settings(kind: TrackKind) -> str:
     """x265's parameters for a kind of track, beyond preset and rate."""
     return X265_PARAMS[kind]
@@ -34,7 +48,7 @@ def hevc_encoder(settings: VideoSettings) -> VideoEncoder:
 
 def hevc_decoder(low_delay: bool = True) -> VideoDecoder:
     """FFmpeg's own decoder."""
-    return PyavDecoder("hevc", "an HEVC access unit", low_delay)
+    return PyavDecoder(DECODER, WORDS.unit, low_delay)
 
 
 def hevc_options(settings: VideoSettings) -> dict[str, str]:
@@ -52,3 +66,19 @@ def hevc_options(settings: VideoSettings) -> dict[str, str]:
         "x265-params": params,
         **settings.rate.options(),
     }
+
+
+HEVC = Codec(
+    title="HEVC",
+    foxglove="h265",
+    encoder=hevc_encoder,
+    decoder=hevc_decoder,
+    library=DECODER,
+    settings=hevc_settings,
+    options=hevc_options,
+    max_qp=MAX_QP,
+    qp_line=(1.0, 0.0),
+    maps=H26X,
+    units=HevcUnits,
+    words=WORDS,
+)

@@ -1,10 +1,11 @@
-"""What HEVC access units say about the pictures that they build on (ITU-T H.265, 7.3 and 8.3)."""
+"""What HEVC access units say about themselves and the pictures that they build on (ITU-T H.265, 7.3, 8.3)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mvcodec.video.annexb import nal_units
+from mvcodec.video.access_unit import Colour, Sequence, UnitFacts
+from mvcodec.video.annexb import begins_with_start_code, nal_units
 from mvcodec.video.bits import BitReader, NalError, payload
 
 IDR_KINDS = frozenset({19, 20})
@@ -24,9 +25,13 @@ _SLICE_BYTES = 512
 MAX_PARAMETER_SET_BYTES = 4096
 MAX_REFERENCE_SETS = 64
 MAX_REFERENCES = 16
+MAX_LONG_TERM = 32
 """As the standard has them (7.4.3.2.1, A.4.2)."""
 
-_PROFILE_BITS = 88
+_MAIN = 1
+"""general_profile_idc."""
+
+_EXTENDED_SAR = 255
 _PIXEL_SHAPE_EXTENDED = 3
 
 ReferenceSet = tuple[tuple[int, bool], ...]
@@ -35,14 +40,18 @@ ReferenceSet = tuple[tuple[int, bool], ...]
 
 @dataclass(frozen=True, slots=True)
 class HevcSequence:
-    """A sequence parameter set, as far as references go.
+    """A sequence parameter set, as far as mvcodec cares.
 
     Attributes:
+        size: (width, height), px after cropping.
+        facts: profile, reordering and colour.
         order_bits: bits of slice_pic_order_cnt_lsb.
         reference_sets: the short-term ones that slices name by number.
         separate_planes: separate_colour_plane_flag.
     """
 
+    size: tuple[int, int]
+    facts: Sequence
     order_bits: int
     reference_sets: tuple[ReferenceSet, ...]
     separate_planes: bool
@@ -67,55 +76,74 @@ def begins_picture(unit: bytes) -> bool:
     return nal_kind(unit) <= LAST_SLICE_KIND and len(unit) > _HEAD_BYTES and bool(unit[2] & 0x80)
 
 
-class HevcReferences:
-    """Follows which pictures of a track are there to build on (8.3.1, 8.3.2); long-term ones are left out."""
+class HevcUnits:
+    """Reads access units: their rules, and which pictures are there to build on (8.3.1, 8.3.2).
+
+    Long-term reference pictures are left out.
+    """
 
     def __init__(self) -> None:
         self._sequences: dict[int, HevcSequence] = {}
         self._picture_sets: dict[int, HevcPictureSet] = {}
         self._held: set[int] = set()
         self._order = 0  # of the picture that the next one's order count builds on
+        self._shown = 0  # order count of the last picture
         self._started = False
 
-    def push(self, data: bytes) -> str | None:
-        """Follow one access unit; returns what is missing, if anything is.
-
-        Raises:
-            NalError: a NAL unit that breaks off or holds what the standard does not allow.
-        """
-        missing = None
+    def push(self, data: bytes) -> UnitFacts:
+        """See `UnitReader`."""
+        broken = [] if begins_with_start_code(data) else [("annex-b", "no start code at its beginning")]
+        missing, kinds, pictures, sequences = None, set(), 0, []
         for unit in nal_units(data):
             kind = nal_kind(unit)
+            kinds.add(kind)
             if kind in (SPS, PPS) and len(unit) > MAX_PARAMETER_SET_BYTES:
                 raise NalError(f"a parameter set of {len(unit)} bytes")
             if kind == SPS:
-                number, sequence = _sequence(BitReader(payload(unit, _HEAD_BYTES)))
+                number, sequence = parse_sequence(BitReader(payload(unit, _HEAD_BYTES)))
                 self._sequences[number] = sequence
+                sequences.append(sequence)
             elif kind == PPS:
                 number, picture_set = _picture_set(BitReader(payload(unit, _HEAD_BYTES)))
                 self._picture_sets[number] = picture_set
             elif begins_picture(unit):
-                missing = self._picture(unit, kind) or missing
-        return missing
+                pictures += 1
+                missing = self._picture(unit, kind, broken) or missing
+        return UnitFacts(
+            keyframe=bool(kinds & IDR_KINDS),
+            pictures=pictures,
+            parameters={VPS, SPS, PPS} <= kinds,
+            sizes=tuple(sequence.size for sequence in sequences),
+            sequences=tuple(sequence.facts for sequence in sequences),
+            broken=tuple(broken),
+            missing=missing,
+        )
 
-    def _picture(self, unit: bytes, kind: int) -> str | None:
+    def _picture(self, unit: bytes, kind: int, broken: list[tuple[str, str]]) -> str | None:
         bits = BitReader(payload(unit, _HEAD_BYTES, _SLICE_BYTES))
         bits.flag()  # first_slice_segment_in_pic_flag
         if kind in _IRAP:
             bits.flag()
         picture_set = self._picture_sets.get(bits.ue())
         sequence = None if picture_set is None else self._sequences.get(picture_set.sequence)
-        if kind in IDR_KINDS:
-            self._held, self._order, self._started = {0}, 0, True
-            return None
-        if not self._started:
+        idr = kind in IDR_KINDS
+        if idr:
+            self._held, self._order, self._shown, self._started = {0}, 0, 0, True
+        elif not self._started:
             return "a picture before the first keyframe"
         if picture_set is None or sequence is None:
             return "a picture whose parameter sets never came"
         bits.u(picture_set.extra_bits)
         bits.ue()  # slice_type
-        bits.u(picture_set.has_output_flag + 2 * sequence.separate_planes)
+        if picture_set.has_output_flag and not bits.flag():
+            broken.append(("hidden", "a picture that is not shown"))
+        bits.u(2 * sequence.separate_planes)
+        if idr:
+            return None
         order = self._full_order(bits.u(sequence.order_bits), sequence.order_bits)
+        if order <= self._shown:
+            broken.append(("reorder", f"picture {order} comes after picture {self._shown}"))
+        self._shown = order
         stays = self._stays(bits, sequence)
         if unit[1] & 7 == 1 and kind not in _NO_ANCHOR:
             self._order = order
@@ -153,25 +181,34 @@ def _picture_set(bits: BitReader) -> tuple[int, HevcPictureSet]:
     return number, HevcPictureSet(sequence, bits.flag(), bits.u(3))
 
 
-def _sequence(bits: BitReader) -> tuple[int, HevcSequence]:
-    """7.3.2.2, up to the reference picture sets."""
+def parse_sequence(bits: BitReader) -> tuple[int, HevcSequence]:
+    """Number and content of a sequence parameter set (7.3.2.2).
+
+    Raises:
+        NalError: it breaks off or holds what the standard does not allow.
+    """
     bits.u(4)
     layers = bits.u(3) + 1
     bits.flag()
-    _skip_profile(bits, layers)
+    profile, is_main = _profile(bits, layers)
     number = bits.ue()
-    separate = bits.ue() == _PIXEL_SHAPE_EXTENDED and bits.flag()
-    bits.ue()
-    bits.ue()
+    chroma = bits.ue()
+    separate = chroma == _PIXEL_SHAPE_EXTENDED and bits.flag()
+    width, height = bits.ue(), bits.ue()
     if bits.flag():  # conformance window
-        for _ in range(4):
-            bits.ue()
-    bits.ue()
-    bits.ue()
+        left, right, top, bottom = (bits.ue() for _ in range(4))
+        width -= (2 if chroma in (1, 2) else 1) * (left + right)
+        height -= (2 if chroma == 1 else 1) * (top + bottom)
+    if width < 1 or height < 1:
+        raise NalError("a sequence parameter set that the standard does not allow")
+    depths = bits.ue() + 8, bits.ue() + 8
     order_bits = bits.ue() + 4
     if order_bits > 16:
         raise NalError(f"{order_bits} bits of picture order count")
-    for _ in range(3 * (layers if bits.flag() else 1)):
+    reorder = 0
+    for _ in range(layers if bits.flag() else 1):
+        bits.ue()
+        reorder = bits.ue()  # of the highest layer, in the end
         bits.ue()
     for _ in range(6):  # sizes of blocks and depths of trees
         bits.ue()
@@ -183,23 +220,68 @@ def _sequence(bits: BitReader) -> tuple[int, HevcSequence]:
         bits.ue()
         bits.ue()
         bits.flag()
+    sets = _reference_sets(bits)
+    if bits.flag():  # long-term reference pictures
+        bits.u(_long_term_count(bits) * (order_bits + 1))
+    bits.u(2)
+    colour, fields = _usability(bits) if bits.flag() else (None, False)
+    plain = is_main and chroma == 1 and depths == (8, 8) and not fields
+    facts = Sequence(
+        None if plain else f"general_profile_idc {profile}, {depths[0]} bits, chroma_format_idc {chroma}",
+        f"sps_max_num_reorder_pics {reorder}" if reorder else None,
+        colour,
+    )
+    return number, HevcSequence((width, height), facts, order_bits, sets, separate)
+
+
+def _long_term_count(bits: BitReader) -> int:
+    count = bits.ue()
+    if count > MAX_LONG_TERM:
+        raise NalError(f"{count} long-term reference pictures")
+    return count
+
+
+def _reference_sets(bits: BitReader) -> tuple[ReferenceSet, ...]:
     count = bits.ue()
     if count > MAX_REFERENCE_SETS:
         raise NalError(f"{count} reference picture sets")
     sets: list[ReferenceSet] = []
     for index in range(count):
         sets.append(_reference_set(bits, index, sets, in_slice=False))
-    return number, HevcSequence(order_bits, tuple(sets), separate)
+    return tuple(sets)
 
 
-def _skip_profile(bits: BitReader, layers: int) -> None:
-    """profile_tier_level (7.3.3)."""
-    bits.u(_PROFILE_BITS + 8)
+def _usability(bits: BitReader) -> tuple[Colour, bool]:
+    """Video usability information (annex E.2.1): colour, and whether pictures are fields."""
+    if bits.flag() and bits.u(8) == _EXTENDED_SAR:
+        bits.u(32)
+    if bits.flag():
+        bits.flag()
+    colour = Colour(False, None, None, None)
+    if bits.flag():
+        bits.u(3)
+        full = bits.flag()
+        described = bits.flag()
+        colour = Colour(full, *((bits.u(8), bits.u(8), bits.u(8)) if described else (None, None, None)))
+    if bits.flag():  # chroma location
+        bits.ue()
+        bits.ue()
+    bits.flag()  # neutral_chroma_indication_flag
+    return colour, bits.flag()
+
+
+def _profile(bits: BitReader, layers: int) -> tuple[int, bool]:
+    """profile_tier_level (7.3.3): general_profile_idc, and whether decoders of Main decode it."""
+    bits.u(3)  # profile space and tier
+    profile = bits.u(5)
+    compatible = bits.u(32)
+    bits.u(48 + 8)  # constraints and level
     present = [(bits.flag(), bits.flag()) for _ in range(layers - 1)]
     if present:
         bits.u(2 * (8 - len(present)))
-    for profile, level in present:
-        bits.u(_PROFILE_BITS * profile + 8 * level)
+    for has_profile, has_level in present:
+        bits.u(88 * has_profile + 8 * has_level)
+    return profile, profile == _MAIN or bool(compatible >> (31 - _MAIN) & 1)
 
 
 def _skip_scaling_lists(bits: BitReader) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mvcodec.errors import MissingReference, StreamError
 from mvcodec.video.codec import Codec, Planes
+from mvcodec.video.reference_watch import ReferenceWatch
 
 
 class TrackDecoder:
@@ -20,15 +21,16 @@ class TrackDecoder:
     def __init__(self, codec: Codec, size: tuple[int, int]) -> None:
         self._codec, self._size = codec, size
         self._decoder = codec.decoder()
-        self._watch = codec.watch(size)
+        self._watch = ReferenceWatch(codec, size)
         self.lost = False
 
-    def push(self, data: bytes, keyframe: bool, label: str) -> Planes:
+    def push(self, data: bytes, keyframe: bool, label: str, index: int | None = None) -> Planes:
         """Decode an access unit.
 
         Args:
             keyframe: it stands on its own.
             label: what to call it in an error.
+            index: number of its frame set.
 
         Raises:
             MissingReference: it builds on a picture that is not there.
@@ -40,13 +42,13 @@ class TrackDecoder:
         if self.lost:
             raise MissingReference(label, "a picture that builds on one that is missing", "a keyframe")
         try:
-            return self._decode(data, label)
+            return self._decode(data, label, index)
         except StreamError:
             self.lost = True
             raise
 
-    def _decode(self, data: bytes, label: str) -> Planes:
-        self._watch.push(data, label)
+    def _decode(self, data: bytes, label: str, index: int | None) -> Planes:
+        self._watch.push(data, label, index)
         found = self._decoder.push(data, label)
         if len(found) != 1:
             raise StreamError(label, f"{len(found)} pictures in an access unit", "one")

@@ -1,0 +1,90 @@
+"""What an access unit says about itself, in the same words for every codec."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+
+@dataclass(frozen=True, slots=True)
+class Colour:
+    """What a stream says of colour; None where it says nothing.
+
+    Attributes:
+        full_range: video_full_range_flag, color_range.
+        primaries, transfer, matrix: as in ITU-T H.273; 1 is BT.709.
+    """
+
+    full_range: bool
+    primaries: int | None
+    transfer: int | None
+    matrix: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """What a stream says of all its pictures from here on.
+
+    Attributes:
+        unlike: in what it is not of the plain profile that FORMAT.md has for its codec; None: it is.
+        reordered: why a picture may wait for a later one; None: none does.
+        colour: None where the stream says nothing.
+    """
+
+    unlike: str | None
+    reordered: str | None
+    colour: Colour | None
+
+
+@dataclass(frozen=True, slots=True)
+class UnitFacts:
+    """What one access unit holds.
+
+    Attributes:
+        keyframe: decoding can start here.
+        pictures: how many begin in it, hidden ones too.
+        parameters: all parameter sets that a keyframe needs are in it.
+        sizes: (width, height) of pictures, px, as often as it says them.
+        sequences: in order.
+        broken: (code, message) of each rule of the codec's own that it breaks.
+        missing: what it builds on that never came.
+    """
+
+    keyframe: bool
+    pictures: int
+    parameters: bool
+    sizes: tuple[tuple[int, int], ...] = ()
+    sequences: tuple[Sequence, ...] = ()
+    broken: tuple[tuple[str, str], ...] = ()
+    missing: str | None = None
+
+
+class UnitReader(Protocol):
+    """Reads the access units of one track in order; remembers parameter sets and which pictures there are."""
+
+    def push(self, data: bytes) -> UnitFacts:
+        """Read one access unit.
+
+        Raises:
+            NalError: it breaks off, or holds what the standard does not allow.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class UnitWords:
+    """What a codec's standard calls things, for messages.
+
+    Attributes:
+        unit: what one message holds.
+        part: what it is made of, which damage breaks.
+        keyframe: a picture where decoding can start.
+        parameters: what must be with it.
+        profile: the plain one.
+    """
+
+    unit: str
+    part: str
+    keyframe: str
+    parameters: str
+    profile: str
