@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import re
 import subprocess
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -103,27 +101,6 @@ def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixtu
         main([command, "--help"])
     assert left.value.code == 0
     assert f"usage: mvcodec {command}" in capsys.readouterr().out
-
-
-README = Path(__file__).parents[1] / "README.md"
-AS_ENCODE = "--disparity-*"
-"""How the README abbreviates a family of options."""
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_the_readme_names_the_options_that_a_command_has(
-    command: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    entry = re.search(rf"^    mvcodec {command} .*\n(?: {{19}}.*\n)*", README.read_text(), re.MULTILINE)
-    assert entry is not None
-    with pytest.raises(SystemExit):
-        main([command, "--help"])
-    usage = capsys.readouterr().out.split("\n\n")[0]
-    offered = set(re.findall(r"(?<=[\s\[])--[a-z][a-z-]*", usage)) - {"--help", "--quiet"}
-    named = set(re.findall(r"--[a-z][a-z-]*\*?", entry[0]))
-    if AS_ENCODE in named:
-        named = named - {AS_ENCODE} | {option for option in offered if option.startswith(AS_ENCODE[:-1])}
-    assert named == offered
 
 
 @pytest.mark.parametrize(

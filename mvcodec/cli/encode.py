@@ -29,6 +29,7 @@ from mvcodec.cli.live_view_option import add_live_view, live_view
 from mvcodec.cli.paths import check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_chunk_ms
+from mvcodec.cli.segment_options import add_segment, check_continues, plan
 from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD
 from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.container import McapWriter, read_info
@@ -68,6 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_chunk_ms(parser)
     add_live_view(parser)
     add_stream_arguments(parser)
+    add_segment(parser)
     add_frames(parser, "frames of the input to code")
     add_output_options(parser, "print what the file holds as JSON")
 
@@ -76,10 +78,13 @@ def run(arguments: argparse.Namespace) -> None:
     """Encode; leaves no output where nothing was encoded, a proper one where something was."""
     _check_output(arguments.output, arguments.input)
     _check_effect(arguments)
-    if is_stream(arguments):
-        writer = encode_stream(arguments, lambda array: _config(array, arguments))
-    else:
-        writer = _encode_files(arguments)
+    writer = (
+        encode_stream(arguments, lambda array: _config(array, arguments))
+        if is_stream(arguments)
+        else _encode_files(arguments)
+    )
+    if writer is None:
+        return
     if isinstance(writer, TalliedWriter):
         if not arguments.quiet:
             print(f"mvcodec: {OUTPUT_NAME}: {summary(writer.info())}", file=sys.stderr)
@@ -99,21 +104,28 @@ def _check_effect(arguments: argparse.Namespace) -> None:
         raise SettingError("--nominal", "no --depth", "--depth raw16, for which it accepts the calibration")
     if not is_stream(arguments):
         refuse_stream_options(arguments)
+    elif arguments.dry_run or arguments.continues:
+        option = "--dry-run" if arguments.dry_run else "--continues"
+        raise SettingError(option, "with a recording or a stream", "an array folder or videos")
 
 
-def _encode_files(arguments: argparse.Namespace) -> McapWriter:
+def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
     source = open_input(arguments.input, grid=arguments.grid, real=arguments.real)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     array = source.array
     if arguments.calibration is not None:
         array = replace(array, calibration=read_calibration(arguments.calibration))
     config = _config(array, arguments)
+    check_continues(array, config, arguments.continues)
     if not array.calibration.given:
         text = (
             f"{source.name}: no calibration given; nominal values stand in (f = picture width, 0.1 m a step)"
         )
         warnings.warn(text, MvCodecWarning, stacklevel=2)
     range_px = find_range(source, chosen, arguments.disparity_range)
+    if arguments.dry_run:
+        print(plan(array, config, chosen, range_px))
+        return None
     with live_view(arguments) as view:
         return _encode(source, array, chosen, replace(config, disparity_range_px=range_px), arguments, view)
 
@@ -131,7 +143,7 @@ def _encode(
         with (
             deferred_interrupt() as interrupted,
             writer,
-            Encoder(array, config) as encoder,
+            Encoder(array, config, coded_before=arguments.continues) as encoder,
             progress("encode", len(chosen), quiet=arguments.quiet) as bar,
         ):
             for frame_set in source.frame_sets(slice(chosen.start, chosen.stop)):

@@ -24,6 +24,7 @@ COMMANDS: dict[str, str] = {
     "render": "make pictures to take away: paths of the viewpoint, stereo, quilts, refocus",
     "info": "say what a file holds",
     "export-points": "write what the cameras see as points in space",
+    "join": "write segments of one stream into one file, without coding them again",
     "recover": "write a clean file out of a damaged or unfinished one",
     "validate": "check a file against the rules of the format, access unit by access unit",
     "compare": "measure a decoded array against its original",

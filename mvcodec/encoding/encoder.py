@@ -52,15 +52,23 @@ class Encoder:
         config: settings; EncoderConfig() by default.
         matcher: asked in place of config's own (such as one that remembers what that one found); the
             header names config's.
+        coded_before: frame sets of the same stream that another encoder codes, up to a keyframe. At a
+            constant quantiser H.264 and AV1 then give the packets that one encoder for all would give, but
+            for the header's `first_frame`; see `mvcodec.container.join`.
 
     Raises:
         SettingError: a setting does not fit the array, or names an unknown matcher or preset.
     """
 
     def __init__(
-        self, array: CameraArray, config: EncoderConfig | None = None, matcher: Matcher | None = None
+        self,
+        array: CameraArray,
+        config: EncoderConfig | None = None,
+        matcher: Matcher | None = None,
+        *,
+        coded_before: int = 0,
     ) -> None:
-        self.array = array
+        self.array, self._coded_before = array, coded_before
         self.config = config or EncoderConfig()
         self._codec = find_codec(self.config.codec)
         longest = default_gop(array.fps)
@@ -169,7 +177,15 @@ class Encoder:
     def _make_encoders(
         self, kind: TrackKind, cameras: tuple[Position, ...], size: tuple[int, int], rate: RateControl
     ) -> dict[Track, VideoEncoder]:
-        settings = VideoSettings(kind, *size, self.array.fps, self._gop, rate, self.config.preset)
+        settings = VideoSettings(
+            kind,
+            *size,
+            self.array.fps,
+            self._gop,
+            rate,
+            self.config.preset,
+            coded_before=self._coded_before,
+        )
         return {Track(kind, camera): self._codec.encoder(settings) for camera in cameras}
 
     def _make_map_encoders(self, header: StreamHeader) -> dict[Track, VideoEncoder]:

@@ -116,6 +116,8 @@ class VideoSettings:
         rate: bits or quality.
         preset: effort, one of PRESETS.
         low_delay: each picture comes out at once; else the preset's own B-pictures and look-ahead.
+        coded_before: pictures of the same track that another encoder codes before: where the codec can,
+            at a constant quantiser, this one's access units are those that one encoder for all would give.
     """
 
     kind: TrackKind
@@ -126,6 +128,7 @@ class VideoSettings:
     rate: RateControl
     preset: str
     low_delay: bool = True
+    coded_before: int = 0
 
     def __post_init__(self) -> None:
         check_preset(self.preset)

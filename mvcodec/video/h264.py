@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from mvcodec.stream import TrackKind
 from mvcodec.video.access_unit import UnitWords
 from mvcodec.video.annexb import without_user_data
-from mvcodec.video.codec import Codec, VideoDecoder, VideoEncoder, VideoSettings
+from mvcodec.video.codec import Codec, Planes, VideoDecoder, VideoEncoder, VideoSettings
 from mvcodec.video.h264_syntax import H264Units
 from mvcodec.video.map_model import H26X
 from mvcodec.video.pyav import PyavDecoder, PyavEncoder
@@ -13,6 +15,9 @@ from mvcodec.video.pyav import PyavDecoder, PyavEncoder
 MAX_QP = 51
 
 DECODER = "h264"
+
+SLICE_END_PERIOD = 32
+"""After so many pictures x264 ends its slices with the same bits again."""
 
 # No packet may wait for a later picture: no B-frames, no look-ahead, and no variable frame rate
 # (force-cfr), which alone holds one picture back.
@@ -48,7 +53,37 @@ def h264_encoder(settings: VideoSettings) -> VideoEncoder:
     """libx264; closed GOPs, SPS and PPS with each keyframe, Annex B."""
     # x264 puts its options, 600 bytes of text, into each track's first picture: 1 % of a short
     # file with eight tracks. The header's settings say the same once.
-    return PyavEncoder("libx264", h264_options(settings), settings, without_user_data)
+    encoder = PyavEncoder("libx264", h264_options(settings), settings, without_user_data)
+    if settings.low_delay:
+        _count_up(encoder, settings)
+    return encoder
+
+
+def _count_up(encoder: PyavEncoder, settings: VideoSettings) -> None:
+    """Have x264 count the pictures that were coded before: its numbers show in the bits of those that follow.
+
+    The last bit of each slice is taken from a pattern of 32 pictures, and IDR pictures are numbered 0 and 1
+    by turns. What comes after a keyframe depends on nothing else before it.
+    """
+    grey = np.full((settings.height, settings.width), 128, np.uint8)
+    chroma = grey[::2, ::2].copy()
+    for keyframe in keyframes_like(settings.coded_before, settings.gop):
+        encoder.push(Planes(grey, chroma, chroma), keyframe)
+
+
+def keyframes_like(pictures: int, gop: int) -> list[bool]:
+    """Which of a few pictures are keyframes, that they leave x264 counting as so many pictures do."""
+    if not pictures:
+        return []
+    count = (pictures - 1) % SLICE_END_PERIOD + 1
+    even = -(-pictures // gop) % 2 == 0
+    while True:
+        keyframes = [number % gop == 0 for number in range(count)]
+        if (sum(keyframes) % 2 == 0) == even:
+            return keyframes
+        if not keyframes[-1]:
+            return [*keyframes[:-1], True]
+        count += SLICE_END_PERIOD
 
 
 def h264_decoder(low_delay: bool = True) -> VideoDecoder:
