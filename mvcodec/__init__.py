@@ -1,7 +1,116 @@
-"""mvcodec: a free-viewpoint video codec for sparse camera arrays."""
+"""mvcodec: a free-viewpoint video codec for sparse camera arrays.
 
-from mvcodec.array import Calibration, CameraArray, Viewpoint
-from mvcodec.errors import MvCodecError
+What is listed in `mvcodec.__all__` is the public interface; it changes with a new version number and a line
+in CHANGELOG.md only. Everything else, all modules inside of the package, is private and may change any time.
+Names are loaded when they are first used, so that ``import mvcodec`` takes no time.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mvcodec.array import Calibration, CameraArray, Position, Viewpoint
+    from mvcodec.capture.opening import open_input
+    from mvcodec.capture.source import ArraySource
+    from mvcodec.container.info import StreamInfo, read_info
+    from mvcodec.container.reader import McapReader
+    from mvcodec.container.writer import McapWriter
+    from mvcodec.decoding.decoder import Decoder
+    from mvcodec.encoding.config import EncoderConfig
+    from mvcodec.encoding.encoder import Encoder
+    from mvcodec.errors import (
+        InputError,
+        MissingExtra,
+        MissingReference,
+        MvCodecError,
+        MvCodecWarning,
+        OutputError,
+        SettingError,
+        StreamClosed,
+        StreamError,
+    )
+    from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture, RenderedView
+    from mvcodec.layers.refinement import make_matcher
+    from mvcodec.settings import setting
+    from mvcodec.stereo.matcher import Matcher, PairMatcher
+    from mvcodec.stream import Packet, StreamHeader
+    from mvcodec.synthesis.synthesizer import Synthesizer
+    from mvcodec.synthesis.synthesizers import make_synthesizer
+    from mvcodec.video.codec import RateControl
 
 __version__ = "0.1.0"
-__all__ = ["Calibration", "CameraArray", "MvCodecError", "Viewpoint", "__version__"]
+
+_MODULES = {
+    "mvcodec.array": "Calibration CameraArray Position Viewpoint",
+    "mvcodec.capture.opening": "open_input",
+    "mvcodec.capture.source": "ArraySource",
+    "mvcodec.container.info": "StreamInfo read_info",
+    "mvcodec.container.reader": "McapReader",
+    "mvcodec.container.writer": "McapWriter",
+    "mvcodec.decoding.decoder": "Decoder",
+    "mvcodec.encoding.config": "EncoderConfig",
+    "mvcodec.encoding.encoder": "Encoder",
+    "mvcodec.errors": "InputError MissingExtra MissingReference MvCodecError MvCodecWarning OutputError"
+    " SettingError StreamClosed StreamError",
+    "mvcodec.frames": "DecodedSet DisparityMap FrameSet Picture RenderedView",
+    "mvcodec.layers.refinement": "make_matcher",
+    "mvcodec.settings": "setting",
+    "mvcodec.stereo.matcher": "Matcher PairMatcher",
+    "mvcodec.stream": "Packet StreamHeader",
+    "mvcodec.synthesis.synthesizer": "Synthesizer",
+    "mvcodec.synthesis.synthesizers": "make_synthesizer",
+    "mvcodec.video.codec": "RateControl",
+}
+_HOMES = {name: module for module, names in _MODULES.items() for name in names.split()}
+
+__all__ = [
+    "ArraySource",
+    "Calibration",
+    "CameraArray",
+    "DecodedSet",
+    "Decoder",
+    "DisparityMap",
+    "Encoder",
+    "EncoderConfig",
+    "FrameSet",
+    "InputError",
+    "Matcher",
+    "McapReader",
+    "McapWriter",
+    "MissingExtra",
+    "MissingReference",
+    "MvCodecError",
+    "MvCodecWarning",
+    "OutputError",
+    "Packet",
+    "PairMatcher",
+    "Picture",
+    "Position",
+    "RateControl",
+    "RenderedView",
+    "SettingError",
+    "StreamClosed",
+    "StreamError",
+    "StreamHeader",
+    "StreamInfo",
+    "Synthesizer",
+    "Viewpoint",
+    "__version__",
+    "make_matcher",
+    "make_synthesizer",
+    "open_input",
+    "read_info",
+    "setting",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'mvcodec' has no attribute {name!r}")
+    found = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -19,7 +19,7 @@ from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.kernels.growth import nearest_seeds
 from mvcodec.layers.dlr import DlrSettings, refine
-from mvcodec.layers.refinement import matcher_by_name, matcher_choices
+from mvcodec.layers.refinement import make_matcher, matcher_choices
 from mvcodec.layers.segments import split_picture
 from mvcodec.stereo.consistency import median
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
@@ -160,7 +160,7 @@ def test_invalid_pixels_have_no_say() -> None:
 def test_follows_any_matcher_of_any_array(grid: tuple[int, int]) -> None:
     array = linear_or_grid(*grid, 97, 81)
     pictures = Planes(array, 3, 9).pictures()
-    plain, after = matcher_by_name("sad"), matcher_by_name("sad+dlr")
+    plain, after = make_matcher("sad"), make_matcher("sad+dlr")
     range_px = (0.0, 14.0)
     maps = after.match(array, pictures, range_px)
     raw = plain.match(array, pictures, range_px)
@@ -176,7 +176,7 @@ def test_transposed_arrays_give_transposed_maps() -> None:
     pictures = Planes(row, 3, 9).pictures()
     turned = {(col, 0): pictures[0, col].transpose(1, 0, 2).copy() for _, col in pictures}
     along, down = (
-        matcher_by_name("sad+dlr").match(array, views, (0.0, 14.0))
+        make_matcher("sad+dlr").match(array, views, (0.0, 14.0))
         for array, views in ((row, pictures), (column, turned))
     )
     for col in range(2):
@@ -186,7 +186,7 @@ def test_transposed_arrays_give_transposed_maps() -> None:
 def test_unknown_names_and_bad_settings_are_refused() -> None:
     for name in ("sad+dle", "sad+", "x+dlr", "x", ""):
         with pytest.raises(SettingError, match=r"matcher: found .*, expected one of joint, .*, sad, .*\+dlr"):
-            matcher_by_name(name)
+            make_matcher(name)
     for settings, text in (
         ({"jump_px": 0}, "jump_px: found 0"),
         ({"erosion_px": -1}, "erosion_px: found -1"),
@@ -207,7 +207,7 @@ def test_help_and_errors_name_the_refinements(command: str) -> None:
     assert choices in " ".join(shown.split()).replace("dlr- thesis", "dlr-thesis")
 
 
-def test_the_encoder_takes_a_refined_matcher_by_name() -> None:
+def test_the_encoder_takes_a_refined_make_matcher() -> None:
     array = linear_or_grid(1, 2, 64, 48)
     config = EncoderConfig(matcher="sad+dlr", disparity_range_px=(0.0, 14.0), preset="veryfast")
     with Encoder(array, config) as encoder:

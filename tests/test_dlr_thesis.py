@@ -10,7 +10,7 @@ from stereo_scene import Planes, linear_or_grid
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.layers.dlr_thesis import ThesisDlrSettings, refine, refine_layer
-from mvcodec.layers.refinement import matcher_by_name
+from mvcodec.layers.refinement import make_matcher
 from mvcodec.layers.segments import edge_map
 
 NEAR = np.s_[20:60, 40:90]
@@ -136,11 +136,11 @@ def test_survives_tiny_pictures_and_invalid_maps(size: tuple[int, int], split: s
     assert not (found.valid & ~known).any()
 
 
-def test_follows_a_matcher_by_name() -> None:
+def test_follows_a_make_matcher() -> None:
     array = linear_or_grid(1, 2, 97, 81)
     pictures = Planes(array, 3, 9).pictures()
     plain, refined, other = (
-        matcher_by_name(name).match(array, pictures, (0.0, 14.0))[0, 0]
+        make_matcher(name).match(array, pictures, (0.0, 14.0))[0, 0]
         for name in ("sad", "sad+dlr-thesis", "sad+dlr")
     )
     assert (refined.values_px != plain.values_px).any()

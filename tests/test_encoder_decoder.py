@@ -232,6 +232,18 @@ def test_an_unknown_codec_is_named() -> None:
         pushed([Packet(HEADER_TRACK, 0, 0, True, header.to_json())])
 
 
+def test_depth_and_unknown_cameras_are_ignored_by_a_decoder() -> None:
+    with_depth = [packet for packets in encode(ARRAY, 3, depth=True) for packet in packets]
+    kinds = [packet.track.kind for packet in with_depth]
+    assert TrackKind.DEPTH in kinds
+    stray = replace(with_depth[1], track=Track(TrackKind.TEXTURE, (77, 77)))
+    plain = [packet for packet in with_depth if packet.track.kind is not TrackKind.DEPTH]
+    found, expected = pushed([*with_depth[:3], stray, *with_depth[3:]]), pushed(plain)
+    assert len(found) == 3
+    for one, other in zip(found, expected, strict=True):
+        _assert_equal(one, other)
+
+
 def test_nothing_is_taken_after_flush() -> None:
     encoder = Encoder(ARRAY, config())
     packets = encoder.push(frame_set(ARRAY, 0))

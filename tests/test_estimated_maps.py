@@ -26,7 +26,7 @@ from mvcodec.decoding.frame_store import FrameStore
 from mvcodec.encoding.encoder import EncoderConfig
 from mvcodec.errors import MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import DisparityMap, Picture
-from mvcodec.layers.refinement import matcher_by_name
+from mvcodec.layers.refinement import make_matcher
 from mvcodec.stream import StreamHeader, Track, TrackKind
 
 
@@ -142,7 +142,7 @@ def test_cameras_that_are_there_get_their_maps(
             self, array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
         ) -> dict[Position, DisparityMap]:
             asked.append(array)
-            return matcher_by_name("joint").match(array, pictures, range_px)
+            return make_matcher("joint").match(array, pictures, range_px)
 
     assert can_be_estimated(array, pictures)
     maps = estimate_maps(array, pictures, (0.0, 12.0), Counted())
@@ -211,7 +211,7 @@ def test_which_matcher_decodes() -> None:
     with Decoder.open(file) as decoder:
         (by_default,) = decoder
         maps = by_default.disparities
-    expected = matcher_by_name("sgbm").match(by_default.array, by_default.pictures, RANGE_PX)
+    expected = make_matcher("sgbm").match(by_default.array, by_default.pictures, RANGE_PX)
     np.testing.assert_array_equal(maps[0, 0].values_px, expected[0, 0].values_px)
     with pytest.raises(SettingError, match="matcher: found guess, expected one of"):
         Decoder.open(file, matcher="guess")

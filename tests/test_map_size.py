@@ -10,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from mvcodec.encoding.config import EncoderConfig
 from mvcodec.errors import SettingError
 from mvcodec.frames import FloatMap, Picture
 from mvcodec.kernels.enlargement import enlarge
 from mvcodec.stream import DISPARITY_CAMERAS
 from mvcodec.video.disparity_rate import default_disparity_qp, default_disparity_scale
-from mvcodec.video.map_size import check_median, check_scale, coded_size, enlarged, small_size, to_coded
+from mvcodec.video.map_size import coded_size, enlarged, small_size, to_coded
 
 FAR_PX, NEAR_PX = 2.0, 20.0
 
@@ -130,12 +131,12 @@ def test_windows_that_no_median_has_are_refused(window: int) -> None:
     with pytest.raises(
         SettingError, match=rf"disparity_median: found {window}, expected 0 \(off\) or an odd"
     ):
-        check_median(window)
+        EncoderConfig(disparity_median=window)
 
 
 def test_scales_that_the_format_lacks_are_refused() -> None:
     with pytest.raises(SettingError, match="disparity_scale: found 3, expected 1 or 2"):
-        check_scale(3)
+        EncoderConfig(disparity_scale=3)
 
 
 def test_model_halves_maps_of_coarse_pictures_only() -> None:

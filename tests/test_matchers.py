@@ -9,11 +9,11 @@ from stereo_scene import Planes, linear_or_grid
 from mvcodec.array import CameraArray, Position
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, Picture
-from mvcodec.layers.refinement import matcher_by_name
+from mvcodec.layers.refinement import make_matcher
 from mvcodec.stereo.adcensus import AdCensus, AdCensusSettings
 from mvcodec.stereo.fixed_window import MEASURES, FixedWindow, FixedWindowSettings
 from mvcodec.stereo.matcher import PairMatcher
-from mvcodec.stereo.matchers import MATCHERS, make_matcher
+from mvcodec.stereo.matchers import MATCHERS, make_base_matcher
 from mvcodec.stereo.pairwise import Pairwise, camera_pairs
 from mvcodec.stereo.sgbm import Sgbm, SgbmSettings
 
@@ -56,7 +56,7 @@ def test_finds_planes(
     rho, far, near, range_px = case
     array = linear_or_grid(*grid, width=97, height=81, rho=rho if min(grid) > 1 else 1.0)
     scene = Planes(array, far, near)
-    maps = matcher_by_name(name).match(array, scene.pictures(), range_px)
+    maps = make_matcher(name).match(array, scene.pictures(), range_px)
     check_form(maps, array, range_px)
     for position, disparity in maps.items():
         error = np.abs(disparity.values_px - scene.disparity_px(position))
@@ -71,19 +71,19 @@ def test_finds_planes(
 def test_survives_tiny_pictures(name: str, size: tuple[int, int], range_px: tuple[float, float]) -> None:
     array = linear_or_grid(2, 2, *size)
     scene = Planes(array, 1, 2)
-    check_form(matcher_by_name(name).match(array, scene.pictures(), range_px), array, range_px)
+    check_form(make_matcher(name).match(array, scene.pictures(), range_px), array, range_px)
 
 
 @pytest.mark.parametrize("level", [0, 200])
 def test_survives_flat_pictures(name: str, level: int) -> None:
     array = linear_or_grid(2, 2, 60, 50)
     flat = {position: np.full((50, 60, 3), level, np.uint8) for position in array.real}
-    check_form(matcher_by_name(name).match(array, flat, (-4.0, 12.0)), array, (-4.0, 12.0))
+    check_form(make_matcher(name).match(array, flat, (-4.0, 12.0)), array, (-4.0, 12.0))
 
 
 def test_lone_camera_gets_a_flat_map(name: str) -> None:
     array = linear_or_grid(1, 1, 20, 10)
-    maps = matcher_by_name(name).match(array, {(0, 0): np.zeros((10, 20, 3), np.uint8)}, (2.0, 9.0))
+    maps = make_matcher(name).match(array, {(0, 0): np.zeros((10, 20, 3), np.uint8)}, (2.0, 9.0))
     assert (maps[0, 0].values_px == 2.0).all()
     assert not maps[0, 0].valid.any()
 
@@ -92,14 +92,14 @@ def test_leaves_its_input_alone(name: str) -> None:
     array = linear_or_grid(2, 2, 50, 40)
     pictures = Planes(array, 1, 5).pictures()
     before = {position: picture.copy() for position, picture in pictures.items()}
-    matcher_by_name(name).match(array, pictures, (0.0, 8.0))
+    make_matcher(name).match(array, pictures, (0.0, 8.0))
     assert all((pictures[position] == before[position]).all() for position in array.real)
 
 
 def test_is_repeatable(name: str) -> None:
     array = linear_or_grid(2, 2, 90, 70)
     pictures = Planes(array, 1, 5).pictures()
-    first, second = (matcher_by_name(name).match(array, pictures, (0.0, 8.0)) for _ in range(2))
+    first, second = (make_matcher(name).match(array, pictures, (0.0, 8.0)) for _ in range(2))
     for position in array.real:
         assert (first[position].values_px == second[position].values_px).all()
         assert (first[position].valid == second[position].valid).all()
@@ -110,14 +110,14 @@ def test_is_repeatable(name: str) -> None:
 def test_fixed_windows_by_name_resolve_parts_of_a_pixel(measure: str, far: float) -> None:
     array = linear_or_grid(1, 2, 120, 60)
     scene = Planes(array, far, far)
-    maps = matcher_by_name(measure).match(array, scene.pictures(), (-8.0, 8.0))
+    maps = make_matcher(measure).match(array, scene.pictures(), (-8.0, 8.0))
     # Whole pixels would be 0.5 px off.
     assert np.abs(maps[0, 0].values_px[:, 10:-10] - far).mean() < 0.2
 
 
 def test_unknown_name_lists_the_choices() -> None:
     with pytest.raises(SettingError, match=r"matcher: found magic, expected one of .*sgbm.*sad"):
-        make_matcher("magic")
+        make_base_matcher("magic")
 
 
 @pytest.mark.parametrize("far", [2.5, 3.5, -4.5])

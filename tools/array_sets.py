@@ -15,7 +15,7 @@ from mvcodec.array import CameraArray, Position
 from mvcodec.capture import ArraySource, open_input
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
 from mvcodec.frames import DecodedSet, FrameSet
-from mvcodec.layers.refinement import matcher_by_name, matcher_choices
+from mvcodec.layers.refinement import make_matcher, matcher_choices
 from mvcodec.stereo.disparity_range import estimate_range
 
 
@@ -36,7 +36,7 @@ def match_corners(source: ArraySource, matcher: str) -> tuple[FrameSet, DecodedS
     pictures = {camera: originals.pictures[camera] for camera in array.real}
     range_px = estimate_range(array, [originals], None)
     started = time.perf_counter()
-    maps = matcher_by_name(matcher).match(array, pictures, range_px)
+    maps = make_matcher(matcher).match(array, pictures, range_px)
     seconds = time.perf_counter() - started
     decoded = DecodedSet(array, originals.index, originals.time_ns, pictures, maps, range_px)
     return originals, decoded, seconds

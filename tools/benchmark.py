@@ -27,7 +27,7 @@ from mvcodec.array import Viewpoint
 from mvcodec.capture import ArraySource, open_input
 from mvcodec.errors import InputError, SettingError
 from mvcodec.evaluation.quality import QualityMeter
-from mvcodec.layers.refinement import matcher_by_name
+from mvcodec.layers.refinement import make_matcher
 from mvcodec.output.sample import write_sample
 from mvcodec.scenes.scene import SceneSettings
 from mvcodec.synthesis.synthesizer import Synthesizer
@@ -125,7 +125,7 @@ def measure(arguments: argparse.Namespace) -> dict[str, Any]:
     """What was asked for, in the form of ``--json``."""
     for name in (arguments.matcher, arguments.maps):
         if name is not None:
-            matcher_by_name(name)  # a misspelt one is told before anything is measured
+            make_matcher(name)  # a misspelt one is told before anything is measured
     if arguments.data is None:
         if arguments.what != "speed":
             raise SettingError(

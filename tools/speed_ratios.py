@@ -27,7 +27,7 @@ from mvcodec.container.writer import McapWriter
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.encoding.encoder import Encoder, EncoderConfig, default_gop
 from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture
-from mvcodec.layers.refinement import matcher_by_name
+from mvcodec.layers.refinement import make_matcher
 from mvcodec.stereo.disparity_range import estimate_range
 from mvcodec.stream import Packet, TrackKind
 from mvcodec.synthesis.synthesizers import make_synthesizer
@@ -81,7 +81,7 @@ def measure_ratios(source: ArraySource, matcher: str, synthesizer: str) -> dict[
     frame_sets = list(source.frame_sets(slice(0, FRAMES)))
     array, first = source.array, frame_sets[0]
     range_px = estimate_range(array, frame_sets[:1], None)
-    maps = matcher_by_name(matcher).match(array, first.pictures, range_px)
+    maps = make_matcher(matcher).match(array, first.pictures, range_px)
     material = Material(array, frame_sets, maps, range_px)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "speed.mcap"
@@ -124,7 +124,7 @@ def _view(material: Material, synthesizer: str) -> Times:
 
 def _match(material: Material, matcher: str) -> Times:
     array, pictures = material.array, material.frame_sets[0].pictures
-    ours = matcher_by_name(matcher)
+    ours = make_matcher(matcher)
     low, high = material.range_px
     stock = cv2.StereoSGBM.create(
         minDisparity=math.floor(low),

@@ -51,9 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("output", type=local_path, metavar="OUT.mcap", help="or - for standard output")
     rate = parser.add_mutually_exclusive_group()
-    rate.add_argument(
-        "--qp", type=int, metavar="N", help=f"constant QP, 1..51, av1 and vp9 1..63 (default: {default.qp})"
-    )
+    usual = f"(default: {default.rate.qp})"
+    rate.add_argument("--qp", type=int, metavar="N", help=f"constant QP, 1..51, av1 and vp9 1..63 {usual}")
     rate.add_argument("--crf", type=float, metavar="N", help="constant rate factor")
     rate.add_argument(
         "--bitrate", type=float, metavar="KBPS", help="kbit/s of the pictures and maps of all cameras"
@@ -177,6 +176,4 @@ def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
     if arguments.depth:
         require_calibration(array, arguments.nominal)
     rates = {"qp": arguments.qp, "crf": arguments.crf, "bitrate_kbps": arguments.bitrate}
-    if all(value is None for value in rates.values()):
-        rates["qp"] = EncoderConfig().qp
     return checked_config(array, arguments, **rates, depth=arguments.depth is not None)

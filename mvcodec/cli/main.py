@@ -93,7 +93,9 @@ def command_parser(name: str) -> argparse.ArgumentParser:
 
 
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
-    parser = OneLineParser(prog="mvcodec", description=mvcodec.__doc__, allow_abbrev=False)
+    parser = OneLineParser(
+        prog="mvcodec", description=str(mvcodec.__doc__).partition("\n")[0], allow_abbrev=False
+    )
     parser.add_argument("--version", action="version", version=f"mvcodec {mvcodec.__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, purpose in COMMANDS.items():

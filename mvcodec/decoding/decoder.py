@@ -161,7 +161,8 @@ class Decoder(Closing):
     def push(self, packet: Packet) -> list[DecodedSet]:
         """Take a packet, in stream order; returns the decoded set that it completes, if it does.
 
-        Where packets are missing, the set is complete when the next one begins.
+        Where packets are missing, the set is complete when the next one begins. Tracks that decoding has no
+        use for, such as depth and cameras that the header does not name, are ignored.
 
         Raises:
             StreamError: damage, with topic and time.
@@ -171,7 +172,7 @@ class Decoder(Closing):
             raise StreamClosed("the decoder was flushed; it takes no more packets")
         if packet.track.kind is TrackKind.HEADER:
             return self._push_header(packet)
-        if self._header is None or self._skipping:
+        if packet.track not in self._decoders or self._skipping:
             return []
         try:
             sets = self._assembler.push(packet)

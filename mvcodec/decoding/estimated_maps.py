@@ -12,7 +12,7 @@ from mvcodec.array import CameraArray, Position
 from mvcodec.decoding.derived_maps import derive_map
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, Picture
-from mvcodec.layers.refinement import matcher_by_name
+from mvcodec.layers.refinement import make_matcher
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stream import StreamHeader
 
@@ -62,11 +62,11 @@ def decoding_matcher(header: StreamHeader, asked: str | Matcher | None) -> Match
         SettingError: the matcher asked for is not known.
     """
     if asked is not None:
-        return matcher_by_name(asked) if isinstance(asked, str) else asked
+        return make_matcher(asked) if isinstance(asked, str) else asked
     try:
-        return matcher_by_name(str(header.settings.get("matcher", DEFAULT_MATCHER)))
+        return make_matcher(str(header.settings.get("matcher", DEFAULT_MATCHER)))
     except SettingError:
-        return matcher_by_name(DEFAULT_MATCHER)
+        return make_matcher(DEFAULT_MATCHER)
 
 
 def can_be_estimated(array: CameraArray, there: Collection[Position]) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import asdict
 from types import TracebackType
 from typing import Any, Self
 
@@ -210,9 +211,7 @@ class Encoder:
         config, codec = self.config, self._codec
         matcher = config.matcher if isinstance(config.matcher, str) else type(config.matcher).__name__
         record = {
-            "qp": config.qp,
-            "crf": config.crf,
-            "bitrate_kbps": config.bitrate_kbps,
+            **asdict(config.rate),
             "disparity_qp": None if maps is None else maps.qp,
             "disparity_median": None if maps is None else self._median,
             "gop": self._gop,

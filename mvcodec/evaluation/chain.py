@@ -47,7 +47,7 @@ def measure_chain(
     Raises:
         SettingError, InputError, OutputError: as encoder, source and writer.
     """
-    assert config.qp is not None
+    assert config.rate.qp is not None
     encoding, decoding = Stopwatch(), Stopwatch()
     part = file.with_suffix(".part")
     try:
@@ -58,7 +58,7 @@ def measure_chain(
     info = read_info(file)
     bits = info.bits
     return CurvePoint(
-        qp=config.qp,
+        qp=config.rate.qp,
         bits=bits.total,
         kbps=bits.total * source.array.fps / len(chosen) / 1000,
         quality=_measure(source, chosen, file, synthesizer, decoding, on_picture),

@@ -179,6 +179,7 @@ class StudyRun:
         """What a point is coded with, as plain JSON values."""
         if curve.anchor is None:
             settings = {**asdict(replace(self.study.config, qp=qp)), "gop": self.gop}
+            settings |= settings.pop("rate")
             return {**settings, "synthesizer": self.study.synthesizer}
         tour = curve.anchor.tours(self.source.array)[0]
         settings = find_codec(curve.codec).options(

@@ -14,7 +14,7 @@ from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.layers import dlr, dlr_thesis
 from mvcodec.stereo.matcher import Matcher
-from mvcodec.stereo.matchers import MATCHERS, make_matcher
+from mvcodec.stereo.matchers import MATCHERS, make_base_matcher
 from mvcodec.stereo.pairwise import transposed
 
 _Pixel = TypeVar("_Pixel", bound=np.generic)
@@ -77,12 +77,12 @@ SEPARATOR = "+"
 
 
 def matcher_choices() -> str:
-    """What `matcher_by_name` takes, for messages and help."""
+    """What `make_matcher` takes, for messages and help."""
     refinements = " or ".join(SEPARATOR + known for known in REFINEMENTS)
     return f"one of {', '.join(MATCHERS)}, with {refinements} behind it if wanted"
 
 
-def matcher_by_name(name: str) -> Matcher:
+def make_matcher(name: str) -> Matcher:
     """The matcher of this name, one of MATCHERS, refined where that of a refinement follows: ``sad+dlr``.
 
     Raises:
@@ -91,5 +91,5 @@ def matcher_by_name(name: str) -> Matcher:
     base, separator, refinement = name.partition(SEPARATOR)
     if base not in MATCHERS or (separator and refinement not in REFINEMENTS):
         raise SettingError("matcher", name, matcher_choices())
-    matcher = make_matcher(base)
+    matcher = make_base_matcher(base)
     return Refined(matcher, REFINEMENTS[refinement]) if separator else matcher

@@ -25,8 +25,8 @@ MATCHERS: dict[str, Callable[[], Matcher]] = {
 }
 
 
-def make_matcher(name: str) -> Matcher:
-    """The matcher of that name.
+def make_base_matcher(name: str) -> Matcher:
+    """The matcher of that name, without a refinement.
 
     Raises:
         SettingError: there is none.

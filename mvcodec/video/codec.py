@@ -79,6 +79,11 @@ class RateControl:
         if self.crf is not None and not 1 <= self.crf <= max_qp:
             raise SettingError("crf", self.crf, f"1..{max_qp}")
 
+    @property
+    def quality(self) -> float | None:
+        """The QP or CRF; None where a bit rate governs."""
+        return self.qp if self.qp is not None else self.crf
+
     def options(self) -> dict[str, str]:
         """As libavcodec's encoders call it."""
         if self.qp is not None:

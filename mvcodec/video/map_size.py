@@ -5,9 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Picture
-from mvcodec.stream import DISPARITY_SCALES, TrackKind
+from mvcodec.stream import TrackKind
 from mvcodec.video.codec import Plane
 from mvcodec.video.colour import even_size, pad_to_even
 
@@ -26,18 +25,6 @@ AGREEMENT_PX = 3.0
 
 COLOUR_STEP = 40.0
 """The colour difference, summed over R, G and B, that counts as much as one sample of distance."""
-
-
-def check_median(window: int | None) -> None:
-    """Raise SettingError where a window is given that is neither 0 (off) nor odd in 3..15."""
-    if window is not None and window != 0 and not (window % 2 == 1 and 3 <= window <= WIDEST_MEDIAN):
-        raise SettingError("disparity_median", window, f"0 (off) or an odd number, 3..{WIDEST_MEDIAN}")
-
-
-def check_scale(scale: int | None) -> None:
-    """Raise SettingError where a scale is given that the format does not know."""
-    if scale is not None and scale not in DISPARITY_SCALES:
-        raise SettingError("disparity_scale", scale, " or ".join(map(str, DISPARITY_SCALES)))
 
 
 def small_size(width: int, height: int, scale: int) -> tuple[int, int]:
