@@ -10,6 +10,7 @@ from typing import Any
 
 from mvcodec.array import MAX_GRID_SIDE, Calibration, Position
 from mvcodec.capture.fields import Fields
+from mvcodec.capture.stated_times import read_times_ns
 from mvcodec.capture.truth import TruthFiles
 from mvcodec.errors import InputError, SettingError
 
@@ -31,7 +32,8 @@ class Manifest:
         path: the file.
         rows, cols: the grid.
         views: the files of every grid position.
-        fps: frame sets a second; 15 where the file states none (the rate of video files prevails).
+        fps: frame sets a second; None where the file states none.
+        times_ns: when the pictures of a view were taken, where the file states that.
         name: of the scene; the folder's where the file states none.
         rho, calibration, disparity_per_step_px: as in CameraArray; None where not stated.
         truth: ground truth by view.
@@ -43,8 +45,9 @@ class Manifest:
     rows: int
     cols: int
     views: dict[Position, ViewFiles]
-    fps: float
+    fps: float | None
     name: str
+    times_ns: dict[Position, tuple[int, ...]] = field(default_factory=dict)
     rho: float = 1.0
     calibration: Calibration | None = None
     disparity_per_step_px: tuple[float, float] | None = None
@@ -71,8 +74,9 @@ def read_manifest(path: Path) -> Manifest:
         rows=rows,
         cols=cols,
         views=views,
-        fps=fields.number("fps", DEFAULT_FPS, positive=True),
+        fps=fields.number("fps", positive=True) if "fps" in fields else None,
         name=fields.text("name", path.resolve().parent.name),
+        times_ns=read_times_ns(fields, rows, cols),
         rho=fields.number("rho", 1.0, positive=True),
         calibration=_calibration(fields),
         disparity_per_step_px=_disparity_range(fields),

@@ -2,60 +2,71 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TypeVar
 
 from mvcodec.array import Calibration, CameraArray, Position
-from mvcodec.capture.manifest import MANIFEST_NAME, Manifest, ViewFiles, read_manifest
+from mvcodec.capture.manifest import DEFAULT_FPS, MANIFEST_NAME, Manifest, ViewFiles, read_manifest
 from mvcodec.capture.selection import select_real
+from mvcodec.capture.shared_clock import StatedTimes, common_times
 from mvcodec.capture.source import ArraySource
+from mvcodec.capture.timing import Timing
 from mvcodec.capture.video_input import VideoView
-from mvcodec.capture.view_array import PictureView, ViewArray, ViewReader, check_views
-from mvcodec.errors import InputError, SettingError
+from mvcodec.capture.view_array import PictureView, ViewArray, ViewReader, check_sizes
+from mvcodec.errors import InputError, MvCodecWarning, SettingError
 
 _OPENERS = 2
 _Files = TypeVar("_Files")
-_FPS_TOLERANCE = 1e-3
 
 
 def open_input(
-    paths: Sequence[Path], *, grid: tuple[int, int] | None = None, real: str = "corners"
+    paths: Sequence[Path],
+    *,
+    grid: tuple[int, int] | None = None,
+    real: str = "corners",
+    timing: Timing | None = None,
 ) -> ArraySource:
-    """Open an input; headers are read, no picture is decoded.
+    """Open an input; of pictures the headers are read, of videos the packets and the first frame.
+
+    Pictures are put together by their times; what is left out or guessed is a warning.
 
     Args:
         paths: one array folder (or its `array.json`), or rows * cols video files in row order.
         grid: (rows, cols); needed for video files, must agree with an array folder.
         real: which cameras are real: ``corners``, ``all``, ``every:K`` or ``R,R..xC,C..``.
+        timing: what is known better than the files say.
 
     Raises:
-        SettingError: `grid` or `real` doesn't fit the input.
-        InputError: something is missing, unreadable, malformed, or the views differ in size,
-            length or frame rate.
+        SettingError: `grid`, `real` or `timing` doesn't fit the input.
+        InputError: something is missing, unreadable, malformed, the views differ in size, or have
+            no time in common.
     """
+    timing = timing or Timing()
     if not paths:
         raise SettingError("INPUT", "nothing", "an array folder, or video files and --grid RxC")
     for path in paths:
         if not path.exists():
             raise InputError(path, "nothing there", "an array folder or a video file")
     if len(paths) == 1 and (paths[0].is_dir() or paths[0].suffix.lower() == ".json"):
-        return _open_folder(paths[0], grid, real)
-    return _open_videos(paths, grid, real)
+        return _open_folder(paths[0], grid, real, timing)
+    return _open_videos(paths, grid, real, timing)
 
 
-def _open_folder(path: Path, grid: tuple[int, int] | None, real: str) -> ViewArray:
+def _open_folder(path: Path, grid: tuple[int, int] | None, real: str, timing: Timing) -> ViewArray:
     manifest = read_manifest(_find_manifest(path))
     if grid not in (None, (manifest.rows, manifest.cols)):
         raise SettingError(
             "--grid", _grid_text(grid), f"{manifest.rows}x{manifest.cols} as {manifest.path} says"
         )
     views = _open_views(manifest.views, _open_view)
-    fps = _common_fps(views) or manifest.fps
+    stated = StatedTimes(manifest.path, manifest.fps, manifest.times_ns, manifest.first_frame)
+    fps, pairing = common_times(str(path), views, stated, timing, DEFAULT_FPS)
     array = _folder_array(manifest, views[0, 0].size, fps, real)
-    count = views[0, 0].count
     for position, files in manifest.truth.items():
+        count = views[position].count
         if len(files.names) not in (1, count):
             found = f"{len(files.names)} truth files for view {position[0]},{position[1]}"
             raise InputError(manifest.path, found, f"1 or {count}, one for each frame")
@@ -63,6 +74,7 @@ def _open_folder(path: Path, grid: tuple[int, int] | None, real: str) -> ViewArr
         str(path),
         array,
         views,
+        pairing,
         truth=manifest.truth,
         first_frame=manifest.first_frame,
         listed_real=manifest.real,
@@ -104,7 +116,7 @@ def _folder_array(manifest: Manifest, size: tuple[int, int], fps: float, real: s
         raise InputError(manifest.path, f"{error.setting} = {error.found}", error.expected) from None
 
 
-def _open_videos(paths: Sequence[Path], grid: tuple[int, int] | None, real: str) -> ViewArray:
+def _open_videos(paths: Sequence[Path], grid: tuple[int, int] | None, real: str, timing: Timing) -> ViewArray:
     for path in paths:
         if path.is_dir():
             raise InputError(path, "a folder among several inputs", "video files only, or one array folder")
@@ -116,9 +128,8 @@ def _open_videos(paths: Sequence[Path], grid: tuple[int, int] | None, real: str)
     files = {(row, col): paths[row * cols + col] for row in range(rows) for col in range(cols)}
     views = _open_views(files, VideoView)
     first = views[0, 0]
-    fps = _common_fps(views)
-    if not fps:
-        raise InputError(first.path, "no frame rate", "a video file that states one")
+    name = str(paths[0]) if len(paths) == 1 else f"{paths[0]} ... {paths[-1]}"
+    fps, pairing = common_times(name, views, StatedTimes(), timing, None)
     real_rows, real_cols = select_real(real, rows, cols)
     width, height = first.size
     calibration = Calibration.nominal(width, height)
@@ -133,7 +144,7 @@ def _open_videos(paths: Sequence[Path], grid: tuple[int, int] | None, real: str)
         calibration,
         name=first.path.resolve().parent.name,
     )
-    return ViewArray(str(paths[0]) if len(paths) == 1 else f"{paths[0]} ... {paths[-1]}", array, views)
+    return ViewArray(name, array, views, pairing)
 
 
 def _open_views(
@@ -141,21 +152,15 @@ def _open_views(
 ) -> dict[Position, ViewReader]:
     with ThreadPoolExecutor(_OPENERS, "mvcodec-open") as pool:
         views = dict(zip(files, pool.map(opener, files.values()), strict=True))
-    check_views(views)
+    check_sizes(views)
+    for view in views.values():
+        for note in view.notes:
+            warnings.warn(f"{view.path}: {note}", MvCodecWarning, stacklevel=3)
     return views
 
 
 def _open_view(files: ViewFiles) -> ViewReader:
     return VideoView(files) if isinstance(files, Path) else PictureView(files)
-
-
-def _common_fps(views: dict[Position, ViewReader]) -> float | None:
-    """The frame rate of the views that are video files; None where none of them states one."""
-    rated = [view for view in views.values() if isinstance(view, VideoView) and view.fps > 0]
-    for view in rated:
-        if abs(view.fps - rated[0].fps) > _FPS_TOLERANCE * rated[0].fps:
-            raise InputError(view.path, f"{view.fps:g} frames/s", f"{rated[0].fps:g} as in {rated[0].path}")
-    return rated[0].fps if rated else None
 
 
 def _grid_text(grid: tuple[int, int] | None) -> str:

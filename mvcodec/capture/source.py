@@ -46,8 +46,8 @@ class ArraySource(Protocol):
             views: grid positions to read; the real cameras where None.
 
         Yields:
-            FrameSet with ``index = first_frame + frame number`` and
-            ``time_ns = round(index * 1e9 / fps)``.
+            FrameSet with ``index = first_frame + frame number``, and when its pictures were taken; of
+            files without times ``time_ns = round(index * 1e9 / fps)``.
 
         Raises:
             SettingError: an empty slice, or a view outside the grid.

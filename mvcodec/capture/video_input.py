@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from fractions import Fraction
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import cast
 
 import av
 import av.error
 import numpy as np
+from av.container import InputContainer
+from av.sidedata.sidedata import SideData
+from av.sidedata.sidedata import Type as SideDataType
+from av.stream import Disposition
 from av.video.frame import VideoFrame
 from av.video.reformatter import ColorRange, Colorspace, Interpolation, VideoReformatter
 from av.video.stream import VideoStream
 
+from mvcodec.capture.orientation import UPRIGHT, Orientation, matrix_orientation
 from mvcodec.capture.picture_files import wrong_size
+from mvcodec.capture.video_times import read_times
 from mvcodec.errors import InputError
 from mvcodec.frames import Picture
 
@@ -41,9 +47,11 @@ class VideoView:
 
     Attributes:
         path: the file.
-        size: (width, height), px.
-        count: frames in it.
-        fps: its frame rate.
+        size: (width, height) as shown, px.
+        count: frames that can be shown, by the packets and edit lists.
+        times_ns: when they are shown, ascending; None where the file has no times.
+        fps: its frame rate; 0 where nothing says so.
+        notes: what is unusual about it, one line each.
 
     Raises:
         InputError: missing, unreadable, or without a video stream or any frame.
@@ -52,41 +60,62 @@ class VideoView:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            with av.open(str(path)) as container:
-                stream = _video_stream(container, path)
-                self.size = stream.width, stream.height
-                self.fps = float(stream.average_rate or stream.guessed_rate or Fraction(0))
-                self.count = stream.frames or sum(packet.size > 0 for packet in container.demux(stream))
+            with _opened(path) as container:
+                times = read_times(container, _video_stream(container, path))
+            with _opened(path) as container:
+                first = next(container.decode(_video_stream(container, path)), None)
         except (av.error.FFmpegError, OSError) as error:
             raise _unreadable(path, error) from None
-        if self.count < 1 or min(self.size) < 1:
+        if times.count < 1 or first is None or min(first.width, first.height) < 1:
             raise InputError(path, "no frames", "a video file")
+        self._stamps = times.stamps
+        self.count, self.times_ns, self.fps = times.count, times.times_ns, times.fps
+        self._coded_size = first.width, first.height
+        self._orientation, self.notes = _orientation(first)
+        self.size = self._orientation.size(*self._coded_size)
+        if times.late:
+            self.notes += (f"{times.late} frames are left out, since they come before the first keyframe",)
 
-    def pictures(self, frames: range) -> Iterator[Picture]:
-        """uint8 (H, W, 3) RGB of consecutive frames, decoded as they are asked for.
+    def pictures(self, frames: Sequence[int]) -> Iterator[Picture]:
+        """uint8 (H, W, 3) RGB of some frames, decoded as they are asked for.
+
+        Args:
+            frames: their numbers, ascending.
 
         Raises:
-            InputError: damaged, shorter than its header says, or changing its size.
+            InputError: damaged, shorter than its packets say, or changing its size.
         """
         given = 0
-        reformatter = VideoReformatter()
         try:
-            with av.open(str(self.path)) as container:
+            with _opened(self.path) as container:
                 stream = _video_stream(container, self.path)
                 # The views are decoded side by side; threads within one would only compete.
                 stream.codec_context.thread_count = 1
-                for number, frame in enumerate(container.decode(stream)):
-                    if number in frames:
-                        if (frame.width, frame.height) != self.size:
-                            raise wrong_size(self.path, (frame.width, frame.height), self.size)
-                        yield frame_to_rgb(frame, reformatter)
-                        given += 1
-                    if number + 1 >= frames.stop:
+                reformatter = VideoReformatter()
+                for number, frame in self._numbered(container.decode(stream)):
+                    if given < len(frames) and number > frames[given]:
                         break
+                    if given < len(frames) and number == frames[given]:
+                        if (frame.width, frame.height) != self._coded_size:
+                            raise wrong_size(self.path, (frame.width, frame.height), self._coded_size)
+                        yield self._orientation.apply(frame_to_rgb(frame, reformatter))
+                        given += 1
+                    if given == len(frames):
+                        return
         except (av.error.FFmpegError, OSError) as error:
             raise _unreadable(self.path, error) from None
         if given < len(frames):
-            raise InputError(self.path, f"{frames.start + given} frames", f"{frames.stop} frames")
+            raise InputError(self.path, f"no frame {frames[given]}", f"{self.count} frames")
+
+    def _numbered(self, frames: Iterator[VideoFrame]) -> Iterator[tuple[int, VideoFrame]]:
+        """Decoded frames with their numbers; without those that are left out."""
+        if not self._stamps:
+            yield from enumerate(frames)
+            return
+        numbers = {stamp: number for number, stamp in enumerate(self._stamps)}
+        for frame in frames:
+            if frame.pts in numbers:
+                yield numbers[frame.pts], frame
 
 
 def frame_to_rgb(frame: VideoFrame, reformatter: VideoReformatter) -> Picture:
@@ -107,10 +136,31 @@ def frame_to_rgb(frame: VideoFrame, reformatter: VideoReformatter) -> Picture:
     return np.ascontiguousarray(rgb.to_ndarray(), np.uint8)
 
 
-def _video_stream(container: av.container.InputContainer, path: Path) -> VideoStream:
-    if not container.streams.video:
-        raise InputError(path, "no video stream", "a video file")
-    return container.streams.video[0]
+def _orientation(frame: VideoFrame) -> tuple[Orientation, tuple[str, ...]]:
+    # PyAV's annotations take it for a mapping of texts.
+    sides = cast("Iterable[SideData]", frame.side_data)
+    data = next((bytes(side) for side in sides if side.type == SideDataType.DISPLAYMATRIX), None)
+    if data is None:
+        return UPRIGHT, ()
+    found = matrix_orientation(data)
+    if found is None:
+        return UPRIGHT, (
+            f"its rotation by {frame.rotation} degrees is ignored: only quarter turns are applied",
+        )
+    return found, ()
+
+
+def _opened(path: Path) -> InputContainer:
+    # A name is never an address: "file:" keeps FFmpeg from reading "cam:1.mp4" as a protocol.
+    return av.open(f"file:{path}")
+
+
+def _video_stream(container: InputContainer, path: Path) -> VideoStream:
+    """The first stream that is a video: a cover picture is none."""
+    for stream in container.streams.video:
+        if not stream.disposition & (Disposition.attached_pic | Disposition.still_image):
+            return stream
+    raise InputError(path, "no video stream", "a video file")
 
 
 def _unreadable(path: Path, error: Exception) -> InputError:

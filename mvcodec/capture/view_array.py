@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Protocol
 
 from mvcodec.array import CameraArray, Position
+from mvcodec.capture.pairing import Pairing
 from mvcodec.capture.picture_files import picture_size, read_picture, wrong_size
 from mvcodec.capture.source import resolve_frames
 from mvcodec.capture.truth import TruthFiles
-from mvcodec.errors import InputError, SettingError
+from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 
 _READERS = 2
@@ -29,8 +30,18 @@ class ViewReader(Protocol):
     @property
     def count(self) -> int: ...
 
-    def pictures(self, frames: range) -> Iterator[Picture]:
-        """uint8 (H, W, 3) RGB of consecutive frames, read as they are asked for."""
+    @property
+    def times_ns(self) -> tuple[int, ...] | None:
+        """When the pictures were taken, ascending; None where nothing says so."""
+        ...
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is unusual about the files, one line each."""
+        ...
+
+    def pictures(self, frames: Sequence[int]) -> Iterator[Picture]:
+        """uint8 (H, W, 3) RGB of the frames of these numbers, which ascend, read as they are asked for."""
         ...
 
 
@@ -45,9 +56,11 @@ class PictureView:
         self._paths = paths
         self.path = paths[0]
         self.count = len(paths)
+        self.times_ns: tuple[int, ...] | None = None
+        self.notes: tuple[str, ...] = ()
         self.size = picture_size(paths[0])
 
-    def pictures(self, frames: range) -> Iterator[Picture]:
+    def pictures(self, frames: Sequence[int]) -> Iterator[Picture]:
         """See ViewReader; every picture must have the size of the first one."""
         for frame in frames:
             yield read_picture(self._paths[frame], self.size)
@@ -59,8 +72,8 @@ class ViewArray:
     Args:
         name: the input as the user wrote it.
         array: geometry and real cameras.
-        views: a reader for every grid position, all of the same size and length
-            (see `check_views`).
+        views: a reader for every grid position, all of the same size (see `check_sizes`).
+        pairing: which of their pictures belong together.
         truth: ground truth by view.
         first_frame, listed_real: as in ArraySource.
     """
@@ -70,6 +83,7 @@ class ViewArray:
         name: str,
         array: CameraArray,
         views: Mapping[Position, ViewReader],
+        pairing: Pairing,
         *,
         truth: Mapping[Position, TruthFiles] | None = None,
         first_frame: int = 0,
@@ -77,8 +91,8 @@ class ViewArray:
     ) -> None:
         self.name, self.array = name, array
         self.first_frame, self.listed_real = first_frame, listed_real
-        self.frame_count = views[0, 0].count
-        self._views, self._truth = views, dict(truth or {})
+        self.frame_count = len(pairing.times_ns)
+        self._views, self._pairing, self._truth = views, pairing, dict(truth or {})
 
     def frame_sets(
         self, frames: slice | None = None, views: Collection[Position] | None = None
@@ -93,7 +107,10 @@ class ViewArray:
         return self._read(numbers, chosen)
 
     def _read(self, numbers: range, positions: tuple[Position, ...]) -> Iterator[FrameSet]:
-        streams = {position: self._views[position].pictures(numbers) for position in positions}
+        streams = {
+            position: self._views[position].pictures([self._pairing.numbers[position][n] for n in numbers])
+            for position in positions
+        }
         with ThreadPoolExecutor(_READERS, "mvcodec-read") as pool:
 
             def start() -> dict[Position, Future[Picture]]:
@@ -107,8 +124,7 @@ class ViewArray:
                     pictures = {position: future.result() for position, future in ahead.items()}
                     if number + 1 in numbers:
                         ahead = start()
-                    index = self.first_frame + number
-                    yield FrameSet(index, round(index * 1e9 / self.array.fps), pictures)
+                    yield FrameSet(self.first_frame + number, self._pairing.times_ns[number], pictures)
             finally:
                 for future in ahead.values():
                     future.cancel()
@@ -116,19 +132,18 @@ class ViewArray:
     def truth(self, view: Position, frame: int) -> DisparityMap | None:
         """See ArraySource."""
         files = self._truth.get(view)
-        return None if files is None else files.read(frame, (self.array.width, self.array.height))
+        if files is None:
+            return None
+        return files.read(self._pairing.numbers[view][frame], (self.array.width, self.array.height))
 
 
-def check_views(views: Mapping[Position, ViewReader]) -> None:
-    """All views must have the size and the length of the first one.
+def check_sizes(views: Mapping[Position, ViewReader]) -> None:
+    """All views must have the size of the first one.
 
     Raises:
         InputError: naming the first file that differs, and both values.
     """
     first = views[0, 0]
-    for position, view in views.items():
+    for view in views.values():
         if view.size != first.size:
             raise wrong_size(view.path, view.size, first.size)
-        if view.count != first.count:
-            found = f"{view.count} frames in view {position[0]},{position[1]}"
-            raise InputError(view.path, found, f"{first.count} frames as in the first view of the array")

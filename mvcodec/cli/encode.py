@@ -32,6 +32,7 @@ from mvcodec.cli.safety import add_chunk_ms
 from mvcodec.cli.segment_options import add_segment, check_continues, plan
 from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD
 from mvcodec.cli.tallied_writer import TalliedWriter
+from mvcodec.cli.time_options import add_time_options, timing_of
 from mvcodec.container import McapWriter, read_info
 from mvcodec.depth import require_calibration
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
@@ -67,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--nominal", action="store_true", help="accept nominal calibration for --depth")
     add_chunk_ms(parser)
     add_live_view(parser)
+    add_time_options(parser)
     add_stream_arguments(parser)
     add_segment(parser)
     add_frames(parser, "frames of the input to code")
@@ -109,7 +111,9 @@ def _check_effect(arguments: argparse.Namespace) -> None:
 
 
 def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
-    source = open_input(arguments.input, grid=arguments.grid, real=arguments.real)
+    source = open_input(
+        arguments.input, grid=arguments.grid, real=arguments.real, timing=timing_of(arguments)
+    )
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     array = source.array
     if arguments.calibration is not None:

@@ -31,7 +31,7 @@ from mvcodec.output.live_view import LiveView
 
 SUFFIX = ".mcap"
 
-STREAM_OPTIONS = ("--topics", "--fps", "--tolerance-ms", "--when-behind", "--on-error")
+STREAM_OPTIONS = ("--topics", "--when-behind", "--on-error")
 DEFAULT_WHEN_BEHIND: WhenBehind = "block"
 
 
@@ -46,13 +46,6 @@ def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
         "--topics",
         metavar="T,T;T,T",
         help="the video or image topic of every view: rows separated by ; or one list with --grid",
-    )
-    group.add_argument("--fps", type=float, metavar="N", help="nominal frame rate (default: from the times)")
-    group.add_argument(
-        "--tolerance-ms",
-        type=float,
-        metavar="N",
-        help="how far apart pictures of one frame set may be taken (default: a quarter of a frame's time)",
     )
     group.add_argument(
         "--when-behind",
