@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from mvcodec.synthesis.synthesizers import make_synthesizer
     from mvcodec.video.codec import RateControl
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _MODULES = {
     "mvcodec.array": "Calibration CameraArray Position Viewpoint",

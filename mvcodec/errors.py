@@ -87,11 +87,25 @@ class MissingExtra(MvCodecError):
 
     Args:
         package: what is missing.
-        extra: the extra of mvcodec that brings it.
+        extra: the extra of mvcodec that it belongs to; all packages of that are named.
     """
 
     def __init__(self, package: str, extra: str) -> None:
-        super().__init__(f"{package} is not installed; install it with: pip install 'mvcodec[{extra}]'")
+        wanted = " ".join(f"'{requirement}'" for requirement in _packages_of(extra) or (package,))
+        super().__init__(f"{package} is not installed; install it with: pip install {wanted}")
+
+
+def _packages_of(extra: str) -> list[str]:
+    """What an extra brings, as pip takes it: mvcodec itself may be in no index that pip knows."""
+    import re  # as importlib.metadata, which takes time, for an error alone
+    from importlib import metadata
+
+    try:
+        declared = metadata.requires("mvcodec") or []
+    except metadata.PackageNotFoundError:
+        return []
+    found = [re.fullmatch(r"""(\S+?) *; *extra == ['"]([\w-]+)['"]""", line) for line in declared]
+    return [match[1] for match in found if match is not None and match[2] == extra]
 
 
 class MvCodecWarning(UserWarning):

@@ -333,7 +333,7 @@ def test_what_is_not_installed_is_named_with_its_extra(
 ) -> None:
     monkeypatch.setattr(evaluate, "find_spec", lambda _: None)
     assert main(["evaluate", str(array), "--output", str(tmp_path / "r")]) == 1
-    assert "pip install 'mvcodec[evaluate]'" in capsys.readouterr().err
+    assert "pip install 'bjontegaard>=" in capsys.readouterr().err
 
 
 def plot(*arguments: str | Path) -> subprocess.CompletedProcess[str]:

@@ -264,7 +264,10 @@ def test_without_the_extra_it_says_how_to_install_it(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(play, "find_spec", lambda name: None if name == "uvicorn" else find_spec(name))
     parser = argparse.ArgumentParser()
     play.add_arguments(parser)
-    with pytest.raises(MissingExtra, match=r"uvicorn is not installed.*pip install 'mvcodec\[play\]'"):
+    with pytest.raises(
+        MissingExtra,
+        match=r"uvicorn is not installed.*pip install 'starlette>=.*' 'uvicorn>=.*' 'websockets>=",
+    ):
         play.run(parser.parse_args([str(file)]))
 
 

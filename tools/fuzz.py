@@ -17,7 +17,7 @@ from pathlib import Path
 try:
     import atheris
 except ImportError:
-    sys.exit("atheris is not installed; it has wheels for Linux on x86-64 (pip install 'mvcodec[dev]')")
+    sys.exit("atheris is not installed; it has wheels for Linux on x86-64 (pip install atheris)")
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 with atheris.instrument_imports(include=["mvcodec"]):
