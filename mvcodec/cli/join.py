@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PART.mcap",
         help="files of one encoding, or their URLs, in order of time, as `encode --continues` writes them",
     )
-    parser.add_argument("output", type=local_path, metavar="OUT.mcap")
+    parser.add_argument("output", type=local_path, metavar="OUT.mcap", help="the file to write")
     add_limits(parser)
     add_output_options(parser, "print what the new file holds as JSON")
 
