@@ -16,14 +16,17 @@ if TYPE_CHECKING:
     from mvcodec.container.reader import McapReader
     from mvcodec.container.writer import McapWriter
     from mvcodec.decoding.decoder import Decoder
+    from mvcodec.decoding.video import Video, open
     from mvcodec.encoding.config import EncoderConfig
     from mvcodec.encoding.encoder import Encoder
+    from mvcodec.encoding.pictures_to_file import encode
     from mvcodec.errors import (
         InputError,
         MissingExtra,
         MissingReference,
         MvCodecError,
         MvCodecWarning,
+        NoSuchFrame,
         OutputError,
         SettingError,
         StreamClosed,
@@ -48,10 +51,12 @@ _MODULES = {
     "mvcodec.container.reader": "McapReader",
     "mvcodec.container.writer": "McapWriter",
     "mvcodec.decoding.decoder": "Decoder",
+    "mvcodec.decoding.video": "Video open",
     "mvcodec.encoding.config": "EncoderConfig",
     "mvcodec.encoding.encoder": "Encoder",
-    "mvcodec.errors": "InputError MissingExtra MissingReference MvCodecError MvCodecWarning OutputError"
-    " SettingError StreamClosed StreamError",
+    "mvcodec.encoding.pictures_to_file": "encode",
+    "mvcodec.errors": "InputError MissingExtra MissingReference MvCodecError MvCodecWarning NoSuchFrame"
+    " OutputError SettingError StreamClosed StreamError",
     "mvcodec.frames": "DecodedSet DisparityMap FrameSet Picture RenderedView",
     "mvcodec.layers.refinement": "make_matcher",
     "mvcodec.settings": "setting",
@@ -81,6 +86,7 @@ __all__ = [
     "MissingReference",
     "MvCodecError",
     "MvCodecWarning",
+    "NoSuchFrame",
     "OutputError",
     "Packet",
     "PairMatcher",
@@ -94,10 +100,13 @@ __all__ = [
     "StreamHeader",
     "StreamInfo",
     "Synthesizer",
+    "Video",
     "Viewpoint",
     "__version__",
+    "encode",
     "make_matcher",
     "make_synthesizer",
+    "open",
     "open_input",
     "read_info",
     "setting",

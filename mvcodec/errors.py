@@ -17,7 +17,7 @@ class SettingError(MvCodecError, ValueError):
     """A setting (an option, a configuration field) has a value that is not allowed.
 
     Args:
-        setting: name as the user wrote it, e.g. ``--qp`` or ``EncoderConfig.qp``.
+        setting: name of the library's setting, such as ``qp``; the command line names its option instead.
         found: the offending value.
         expected: what would have been accepted.
     """
@@ -25,6 +25,10 @@ class SettingError(MvCodecError, ValueError):
     def __init__(self, setting: str, found: object, expected: str) -> None:
         super().__init__(f"{setting}: found {found!s}, expected {expected}")
         self.setting, self.found, self.expected = setting, found, expected
+
+
+class NoSuchFrame(SettingError, IndexError):
+    """A frame set was asked for, by number or time, that is not there; `setting` is the file's name."""
 
 
 class InputError(MvCodecError):

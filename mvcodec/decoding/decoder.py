@@ -53,6 +53,7 @@ class Decoder(Closing):
         limits: what is more than that is refused.
         matcher: estimates the maps of a stream that holds none, by name or one's own; by default the one
             that the stream's settings name. It runs when the first map of a frame set is looked at.
+        name: what messages call the stream.
 
     Raises:
         SettingError: another policy, or (where a stream needs it) no matcher of that name.
@@ -63,6 +64,7 @@ class Decoder(Closing):
         on_error: OnError = "stop",
         limits: Limits = DEFAULT_LIMITS,
         matcher: str | Matcher | None = None,
+        name: str = "stream",
     ) -> None:
         if on_error not in get_args(OnError):
             raise SettingError("on_error", on_error, " or ".join(get_args(OnError)))
@@ -75,7 +77,7 @@ class Decoder(Closing):
         self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(WORKERS, "decode")
         self._reader: McapReader | None = None
         self._frames: slice | None = None
-        self._name = "stream"
+        self._name = name
         self._assembler = Assembler(self._name, _warn)
 
     @classmethod

@@ -7,11 +7,13 @@ import time
 from collections import OrderedDict
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from mvcodec.container import McapReader
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.container.shared_file import SharedFile
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.decoding.frame_table import FrameTable, read_frame_table
 from mvcodec.errors import StreamError
@@ -31,11 +33,13 @@ class Damage:
     Attributes:
         first, end: frame numbers, the first damaged one and the next keyframe (or the file's end).
         message: what is wrong, with topic and time.
+        error: the same, as it was raised.
     """
 
     first: int
     end: int
     message: str
+    error: StreamError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +63,7 @@ class FrameStore:
     """Frame sets by number. Safe to use from several threads.
 
     Args:
-        path: an MCAP file, complete or cut off.
+        source: an MCAP file, complete or cut off: its path or URL, or an open one.
         cache_bytes: decoded frame sets are kept up to this size (and at least three of them).
         limits: what is more than that is refused.
         matcher: as `Decoder`'s.
@@ -70,14 +74,15 @@ class FrameStore:
 
     def __init__(
         self,
-        path: Path,
+        source: str | Path | SharedFile,
         cache_bytes: int = CACHE_BYTES,
         limits: Limits = DEFAULT_LIMITS,
         matcher: str | Matcher | None = None,
     ) -> None:
-        self.path = path
+        self._source = source
+        self.name = source.name if isinstance(source, SharedFile) else str(source)
         self._limits, self._matcher = limits, matcher
-        table = read_frame_table(path, limits)
+        table = read_frame_table(_opened(source), limits)
         self.table: FrameTable = replace(table, cut_off=table.cut_off and self._told(table.cut_off))
         self._cache = _Cache(cache_bytes)
         self._cursors: list[_Cursor] = []
@@ -141,18 +146,18 @@ class FrameStore:
         else:
             if len(self._cursors) == MAX_CURSORS:
                 self._cursors.pop(0).close()
-            cursor = _Cursor(self.path, keyframe, self._limits, self._matcher)
+            cursor = _Cursor(_opened(self._source), keyframe, self._limits, self._matcher)
         self._cursors.append(cursor)
         return cursor
 
     def _note_damage(self, frame: int, error: StreamError) -> None:
         table = self.table
-        damage = Damage(frame, table.keyframe_after(frame), self._told(str(error)))
+        damage = Damage(frame, table.keyframe_after(frame), self._told(str(error)), error)
         self._damage[table.keyframe_before(frame)] = damage
 
     def _told(self, message: str) -> str:
         """A message for viewers, whose business the server's folders are not."""
-        return message.replace(str(self.path), self.path.name)
+        return message.replace(self.name, Path(self.name).name)
 
     def _stand_in(self, damage: Damage) -> DecodedSet | None:
         """The last good frame before damage, else the first good one behind it."""
@@ -190,6 +195,10 @@ class _Cache:
                 self._held.popitem(last=False)
 
 
+def _opened(source: str | Path | SharedFile) -> str | Path | BinaryIO:
+    return source.reader() if isinstance(source, SharedFile) else source
+
+
 def _bytes_of(decoded: DecodedSet) -> int:
     pictures = sum(picture.nbytes for picture in decoded.pictures.values())
     # Maps that are made when somebody looks at them count as if they were there.
@@ -204,11 +213,13 @@ class _Cursor:
         next: the frame that `advance` returns.
     """
 
-    def __init__(self, path: Path, keyframe: int, limits: Limits, matcher: str | Matcher | None) -> None:
+    def __init__(
+        self, source: str | Path | BinaryIO, keyframe: int, limits: Limits, matcher: str | Matcher | None
+    ) -> None:
         self.next = keyframe
-        self._reader = McapReader.open(path, limits)
+        self._reader = McapReader.open(source, limits)
         self._packets = self._reader.packets(keyframe)
-        self._decoder = Decoder(limits=limits, matcher=matcher)
+        self._decoder = Decoder(limits=limits, matcher=matcher, name=self._reader.name)
 
     def advance(self) -> DecodedSet:
         """Decode one frame set.

@@ -6,6 +6,7 @@ import warnings
 from bisect import bisect_right
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from mvcodec.container import McapReader
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
@@ -44,20 +45,20 @@ class FrameTable:
         return self.keyframes[place] if place < len(self.keyframes) else self.count
 
 
-def read_frame_table(path: Path, limits: Limits = DEFAULT_LIMITS) -> FrameTable:
+def read_frame_table(source: str | Path | BinaryIO, limits: Limits = DEFAULT_LIMITS) -> FrameTable:
     """Read a file's index; where it has none (it was cut off), the whole file.
 
     Raises:
         InputError: the system refuses to open it.
         StreamError: not a file of ours, or no frame set in it.
     """
-    with McapReader.open(path, limits) as reader:
+    with McapReader.open(source, limits) as reader:
         indexed = reader.frame_times()
         if indexed is None:
             return _scan(reader)
         times, keys = indexed
         if not times:
-            raise StreamError(path, "no frame set", "at least one")
+            raise StreamError(reader.name, "no frame set", "at least one")
         keyframes = {max(bisect_right(times, key) - 1, 0) for key in keys}
         return FrameTable(reader.header, tuple(times), tuple(sorted(keyframes | {0})))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import InitVar, dataclass
+from dataclasses import InitVar, dataclass, fields
 
 from mvcodec.array import CameraArray
 from mvcodec.errors import SettingError
@@ -93,6 +93,11 @@ class EncoderConfig:
         span = self.disparity_range_px
         if span is not None and not (math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]):
             raise SettingError("disparity_range_px", list(span), "lo < hi")
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """What the constructor takes."""
+        return "qp", "crf", "bitrate_kbps", *(item.name for item in fields(cls))
 
     @property
     def quality(self) -> float | None:

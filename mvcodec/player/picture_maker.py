@@ -96,7 +96,7 @@ class PictureMaker:
         stored = self.store.fetch(request.frame)
         if stored.decoded is None:
             found = stored.damage.message if stored.damage else "no frame"
-            raise StreamError(self.store.path.name, found, "a frame that can be decoded")
+            raise StreamError(Path(self.store.name).name, found, "a frame that can be decoded")
         if upcoming:
             self._begin(replace(request, frame=upcoming[0]), upcoming[1:])
         start = time.perf_counter()

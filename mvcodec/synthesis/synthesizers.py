@@ -18,6 +18,8 @@ SYNTHESIZERS: dict[str, Callable[[], Synthesizer]] = {
     "linear": Linear,
 }
 
+DEFAULT_SYNTHESIZER = "layered"
+
 QUICKER = {"layered": "quick"}
 """What stands in for a synthesizer where it would be too slow, as while the viewpoint moves."""
 
