@@ -9,8 +9,9 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from mvcodec.array import Calibration, CameraArray, Position
+from mvcodec.array import MAX_GRID_SIDE, MAX_PICTURE_SIDE, Calibration, CameraArray, Position
 from mvcodec.errors import SettingError, StreamError
+from mvcodec.fields import Fields
 
 FORMAT_VERSIONS = (1, 2)
 """The versions that are read. Written is the lowest that holds all that a decoder must know."""
@@ -48,17 +49,10 @@ class Track:
         return f"/camera/{view_name(self.camera)}/{self.kind.value}"
 
 
-_TYPES: dict[str, tuple[type, ...]] = {
-    "rows": (int,),
-    "cols": (int,),
-    "width": (int,),
-    "height": (int,),
-    "fps": (int, float),
-    "rho": (int, float),
-    "name": (str,),
-}
-"""What JSON types the header's array fields may have."""
+MAX_SEQUENCE = (1 << 32) - 1
+"""MCAP's sequence has 32 bits."""
 
+_CALIBRATION = ("fx_px", "fy_px", "cx_px", "cy_px", "baseline_m", "d_inf_px_per_step")
 
 HEADER_TRACK = Track(TrackKind.HEADER)
 
@@ -163,8 +157,8 @@ class StreamHeader:
             expected = " or ".join(map(str, FORMAT_VERSIONS))
             raise StreamError(source, f"format version {version}", f"version {expected}")
         try:
-            header = cls._from_document(document)
-        except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
+            header = cls._from_fields(Fields(source, document, error=StreamError))
+        except SettingError as error:
             raise StreamError(source, f"a damaged header ({error})", "the fields of FORMAT.md") from None
         if header.version > version:
             found = f"disparity_cameras {header.disparity_cameras} in a header of version {version}"
@@ -172,30 +166,60 @@ class StreamHeader:
         return header
 
     @classmethod
-    def _from_document(cls, document: Mapping[str, Any]) -> StreamHeader:
-        array = dict(document["array"])
-        for name, kind in _TYPES.items():
-            if type(array[name]) not in kind:
-                raise TypeError(f"array.{name} of type {type(array[name]).__name__}")
-        hint = array.pop("disparity_per_step_px")
+    def _from_fields(cls, fields: Fields) -> StreamHeader:
         return cls(
-            array=CameraArray(
-                calibration=Calibration(**array.pop("calibration")),
-                real_rows=tuple(int(row) for row in array.pop("real_rows")),
-                real_cols=tuple(int(col) for col in array.pop("real_cols")),
-                disparity_per_step_px=None if hint is None else (float(hint[0]), float(hint[1])),
-                **array,
-            ),
-            disparity_range_px=(
-                float(document["disparity_range_px"][0]),
-                float(document["disparity_range_px"][1]),
-            ),
-            codec=str(document["codec"]),
-            first_frame=int(document["first_frame"]),
-            settings=dict(document["settings"]),
-            disparity_scale=int(document.get("disparity_scale", 1)),
-            disparity_cameras=str(document.get("disparity_cameras", "all")),
+            array=_array(fields.inner("array")),
+            disparity_range_px=fields.pair("disparity_range_px"),
+            codec=fields.text("codec"),
+            first_frame=fields.integer("first_frame", 0, MAX_SEQUENCE),
+            settings=fields.inner("settings").values,
+            disparity_scale=fields.integer("disparity_scale", 1, DISPARITY_SCALES[-1], 1),
+            disparity_cameras=fields.text("disparity_cameras", "all"),
         )
+
+
+def _array(fields: Fields) -> CameraArray:
+    sides = {name: fields.integer(name, 1, MAX_GRID_SIDE) for name in ("rows", "cols")}
+    sides |= {name: fields.integer(name, 1, MAX_PICTURE_SIDE) for name in ("width", "height")}
+    calibration = fields.inner("calibration")
+    hint = fields.get("disparity_per_step_px", "[lo, hi] or null")
+    return CameraArray(
+        **sides,
+        fps=_number(fields, "fps"),
+        real_rows=fields.integers("real_rows"),
+        real_cols=fields.integers("real_cols"),
+        calibration=Calibration(
+            **{name: _number(calibration, name) for name in _CALIBRATION},
+            given=calibration.truth("given"),
+        ),
+        rho=_number(fields, "rho"),
+        disparity_per_step_px=None if hint is None else fields.pair("disparity_per_step_px"),
+        name=fields.text("name"),
+    )
+
+
+def _number(fields: Fields, key: str) -> float:
+    """A finite number as it was written: a whole one stays whole when the header is written again."""
+    fields.number(key)
+    value: float = fields.values[key]
+    return value
+
+
+def unknown_fields(header: bytes, known: StreamHeader) -> tuple[str, ...]:
+    """Names of what a header says beside the fields of FORMAT.md; its settings are free.
+
+    Args:
+        header: as `from_json` took it.
+        known: what came of it.
+    """
+    said, expected = json.loads(header), json.loads(known.to_json())
+    names = [name for name in said if name not in expected]
+    for prefix, inside, there in (
+        ("array.", said["array"], expected["array"]),
+        ("array.calibration.", said["array"]["calibration"], expected["array"]["calibration"]),
+    ):
+        names += [prefix + name for name in inside if name not in there]
+    return tuple(names)
 
 
 def map_cameras(array: CameraArray, which: str) -> tuple[Position, ...]:

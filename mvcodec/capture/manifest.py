@@ -9,10 +9,10 @@ from string import Formatter
 from typing import Any
 
 from mvcodec.array import MAX_GRID_SIDE, Calibration, Position
-from mvcodec.capture.fields import Fields
 from mvcodec.capture.stated_times import read_times_ns
 from mvcodec.capture.truth import TruthFiles
 from mvcodec.errors import InputError, SettingError
+from mvcodec.fields import Fields
 
 DEFAULT_FPS = 15.0
 MANIFEST_NAME = "array.json"

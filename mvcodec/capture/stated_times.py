@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from mvcodec.array import Position
-from mvcodec.capture.fields import Fields
+from mvcodec.fields import Fields
 
 _KEY = "times_ns"
 _EXPECTED = "a list of whole numbers of nanoseconds, 0 or more, ascending"

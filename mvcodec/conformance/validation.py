@@ -18,7 +18,7 @@ from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.declared import METADATA_NAME
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.errors import InputError, StreamError
-from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track
+from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, unknown_fields
 from mvcodec.video.codecs import CODECS
 from mvcodec.video.map_size import track_sizes
 
@@ -177,6 +177,8 @@ class _StreamCheck:
         except StreamError as failure:
             self._add(error("header", str(failure), topic, time_ns))
             return
+        for name in unknown_fields(record.data, header):
+            self._add(error("header", f"field {name}, which the format does not have", topic, time_ns))
         if self._header is None:
             self._start(header, record.data)
             if record.sequence != header.first_frame:

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mvcodec.array import CameraArray, Viewpoint
-from mvcodec.capture.fields import Fields
 from mvcodec.errors import InputError, SettingError
+from mvcodec.fields import Fields
 
 FILE_SUFFIX = ".json"
 MAX_WAYPOINTS = 100_000

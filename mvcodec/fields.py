@@ -14,16 +14,23 @@ _MISSING = object()
 
 
 class Fields:
-    """One JSON object of a file.
+    """One JSON object of a file or stream.
 
     Args:
         source: the file, for messages.
         values: the object.
         prefix: where in the file it is, e.g. ``calibration.``.
+        error: what is raised: InputError, or StreamError for what a stream says.
     """
 
-    def __init__(self, source: Path, values: dict[str, Any], prefix: str = "") -> None:
-        self.source, self.values, self.prefix = source, values, prefix
+    def __init__(
+        self,
+        source: str | Path,
+        values: dict[str, Any],
+        prefix: str = "",
+        error: type[InputError] = InputError,
+    ) -> None:
+        self.source, self.values, self.prefix, self._error = source, values, prefix, error
 
     @classmethod
     def load(cls, source: Path) -> Fields:
@@ -50,14 +57,14 @@ class Fields:
 
     def wrong(self, key: str, found: object, expected: str) -> InputError:
         """The error for a value of this object."""
-        return InputError(self.source, f"{self.prefix}{key} = {found!s}", expected)
+        return self._error(self.source, f"{self.prefix}{key} = {found!s}", expected)
 
     def get(self, key: str, expected: str, default: object = _MISSING) -> Any:
         """Any value; InputError where it is absent and has no default."""
         if key in self.values:
             return self.values[key]
         if default is _MISSING:
-            raise InputError(self.source, f"no {self.prefix}{key}", expected)
+            raise self._error(self.source, f"no {self.prefix}{key}", expected)
         return default
 
     def integer(self, key: str, low: int, high: int, default: int | None = None) -> int:
@@ -93,12 +100,38 @@ class Fields:
             raise self.wrong(key, _described(value), "a text")
         return value
 
+    def truth(self, key: str, default: bool | None = None) -> bool:
+        """True or false."""
+        value = self.get(key, "true or false", *([] if default is None else [default]))
+        if not isinstance(value, bool):
+            raise self.wrong(key, _described(value), "true or false")
+        return value
+
+    def integers(self, key: str) -> tuple[int, ...]:
+        """A list of whole numbers."""
+        expected = "a list of whole numbers"
+        value = self.get(key, expected)
+        if not isinstance(value, list):
+            raise self.wrong(key, _described(value), expected)
+        for item in value:
+            if isinstance(item, bool) or not isinstance(item, int):
+                raise self.wrong(key, f"a list with {_described(item)} in it", expected)
+        return tuple(value)
+
+    def pair(self, key: str) -> tuple[float, float]:
+        """[lo, hi], two finite numbers."""
+        expected = "[lo, hi], two numbers"
+        value = self.get(key, expected)
+        if not isinstance(value, list) or len(value) != 2:
+            raise self.wrong(key, _described(value), expected)
+        return self.check_number(key, value[0], expected), self.check_number(key, value[1], expected)
+
     def inner(self, key: str) -> Fields:
         """An object inside this one."""
         value = self.get(key, "an object")
         if not isinstance(value, dict):
             raise self.wrong(key, _described(value), "an object")
-        return Fields(self.source, value, f"{self.prefix}{key}.")
+        return Fields(self.source, value, f"{self.prefix}{key}.", self._error)
 
 
 def _described(value: object) -> str:
