@@ -131,7 +131,7 @@ def test_headers_without_a_scale_have_maps_of_full_size() -> None:
     del document["disparity_scale"]
     assert StreamHeader.from_json(json.dumps(document).encode()).disparity_scale == 1
     document["disparity_scale"] = 3
-    with pytest.raises(StreamError, match="disparity_scale = 3, expected a whole number 1..2"):
+    with pytest.raises(StreamError, match=r"disparity_scale = 3, expected a whole number 1\.\.2"):
         StreamHeader.from_json(json.dumps(document).encode())
 
 
