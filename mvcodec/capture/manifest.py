@@ -106,13 +106,13 @@ def _list_of(fields: Fields, key: str, value: Any, length: int, what: str) -> li
 
 def _view_files(fields: Fields, key: str, files: Any) -> ViewFiles:
     if isinstance(files, str) and files:
-        return fields.source.parent / files
+        return Path(fields.source).parent / files
     expected = "a list of picture files, or one video file"
     if not isinstance(files, list):
         raise fields.wrong(key, type(files).__name__, expected)
     if not files or not all(isinstance(file, str) and file for file in files):
         raise fields.wrong(key, "an empty list" if not files else "a list with other things in it", expected)
-    return tuple(fields.source.parent / file for file in files)
+    return tuple(Path(fields.source).parent / file for file in files)
 
 
 def _pattern_views(fields: Fields, rows: int, cols: int) -> dict[Position, ViewFiles]:
@@ -121,7 +121,7 @@ def _pattern_views(fields: Fields, rows: int, cols: int) -> dict[Position, ViewF
     for name, count in (("row", rows), ("col", cols)):
         if count > 1 and name not in names:
             raise fields.wrong("pattern", pattern, f"{{{name}}} in it")
-    folder = fields.source.parent
+    folder = Path(fields.source).parent
     positions = [(row, col) for row in range(rows) for col in range(cols)]
     if "frame" not in names:
         return {(row, col): folder / pattern.format(row=row, col=col) for row, col in positions}
@@ -199,7 +199,7 @@ def _truth(fields: Fields, rows: int, cols: int) -> dict[Position, TruthFiles]:
         steps = inner.integer("steps", -MAX_GRID_SIDE, MAX_GRID_SIDE, 1)
         if steps == 0:
             raise inner.wrong("steps", steps, "a number of grid steps, not 0")
-        truth[position] = TruthFiles(fields.source.parent, _truth_names(inner), scale, invalid, steps)
+        truth[position] = TruthFiles(Path(fields.source).parent, _truth_names(inner), scale, invalid, steps)
     return truth
 
 
