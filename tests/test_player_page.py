@@ -46,6 +46,19 @@ def test_help_and_hidden_controls(page: Page, server: Running) -> None:
     page.wait_for_selector("#fullscreen[aria-pressed=true]")
 
 
+def test_keys_before_the_server_has_spoken_do_nothing(page: Page, server: Running) -> None:
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.route_web_socket("**/view", lambda _: None)  # accepted, and silent
+    page.goto(server.url)
+    for key in ("ArrowLeft", "g", "]", "+", "s", "Home", " ", "m"):
+        page.keyboard.press(key)
+    assert page.is_hidden("#notice")
+    page.keyboard.press("?")
+    page.wait_for_selector("#help[open]")
+    assert errors == []
+
+
 def test_damage_is_told_and_playback_goes_on(page: Page, file: Path, tmp_path: Path) -> None:
     with playing(damage(file, tmp_path / "damaged.mcap", gop=1)) as running:
         show(page, running, f"#frame={GOP}")

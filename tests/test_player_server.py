@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import http.client
+import ipaddress
 import random
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 from command_line import fails
@@ -22,6 +24,7 @@ from mvcodec.errors import MissingExtra
 from mvcodec.evaluation.metrics import psnr, ssim
 from mvcodec.player.access import AccessRules, is_loopback
 from mvcodec.player.messages import MAX_MESSAGE_BYTES
+from mvcodec.player.serving import page_url
 from mvcodec.synthesis.synthesizers import make_synthesizer
 
 pytest_plugins = ("player_fixtures",)
@@ -278,3 +281,11 @@ def test_stops_when_told_to(file: Path) -> None:
         running.stop()
         with pytest.raises(ConnectionClosed):
             viewer.take_all()
+
+
+@pytest.mark.parametrize("everyone", ["0.0.0.0", "::"])
+def test_all_addresses_are_announced_by_one_that_others_can_use(everyone: str) -> None:
+    address = urlsplit(page_url(everyone, 8123))
+    assert address.port == 8123
+    assert not ipaddress.ip_address(str(address.hostname)).is_unspecified
+    assert page_url("127.0.0.1", 80) == "http://127.0.0.1:80/"

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
 import cv2
+import make_samples
 import numpy as np
 import pytest
 from array_files import files_in
@@ -17,7 +16,11 @@ from numpy.typing import NDArray
 from mvcodec.array import Position, Viewpoint
 from mvcodec.capture import open_input
 from mvcodec.capture.truth import read_pfm
+from mvcodec.conformance.validation import validate
+from mvcodec.container import read_info
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import OutputError, SettingError
+from mvcodec.evaluation.metrics import psnr
 from mvcodec.frames import FloatMap, Picture
 from mvcodec.output.sample import write_sample
 from mvcodec.scenes.scene import SCENES, Scene, SceneSettings, make_scene
@@ -296,9 +299,25 @@ def test_the_sample_that_ships(tmp_path: Path) -> None:
     for view, picture in last.pictures.items():
         error = picture.astype(np.float64) - scene.render(Viewpoint(*view), 11)[0]
         assert np.sqrt(np.mean((error @ [0.299, 0.587, 0.114]) ** 2)) < 3
-    subprocess.run([sys.executable, ROOT / "tools" / "make_samples.py", tmp_path], check=True, cwd=tmp_path)
+    make_samples.make_room(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in folder.iterdir()}
     assert (tmp_path / "array.json").read_bytes() == (folder / "array.json").read_bytes()
+
+
+def test_the_coded_sample_that_ships(tmp_path: Path) -> None:
+    """It is what tools/make_samples.py codes of the folder beside it, small, clean and good."""
+    folder = ROOT / "samples" / "room_2x2"
+    coded = folder.with_suffix(".mcap")
+    assert coded.stat().st_size < 300_000
+    assert validate(coded) == []
+    with Decoder.open(coded) as decoder:
+        decoded = list(decoder)
+    originals = list(open_input([folder]).frame_sets())
+    assert [item.index for item in decoded] == [item.index for item in originals]
+    for camera, picture in decoded[-1].pictures.items():
+        assert psnr(originals[-1].pictures[camera], picture) > 36
+    make_samples.code_room(folder, tmp_path / "again.mcap", slice(1))
+    assert read_info(tmp_path / "again.mcap").header == read_info(coded).header
 
 
 def test_photographs_are_not_changed_by_rendering() -> None:

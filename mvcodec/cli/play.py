@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from contextlib import suppress
 from functools import partial
 from importlib.util import find_spec
@@ -44,13 +45,15 @@ def run(arguments: argparse.Namespace) -> None:
     from mvcodec.player.picture_maker import PictureMaker
     from mvcodec.player.server import Broadcast
     from mvcodec.player.serving import serve
+    from mvcodec.player.warming import warm_up_beside
 
     make_synthesizer(arguments.synthesizer)  # a wrong name is told before anything is opened
     quicker = QUICKER.get(arguments.synthesizer)
+    makers = [partial(make_synthesizer, name) for name in (arguments.synthesizer, quicker) if name]
     maker = PictureMaker(
         arguments.input,
-        partial(make_synthesizer, arguments.synthesizer),
-        partial(make_synthesizer, quicker) if quicker else None,
+        makers[0],
+        makers[1] if quicker else None,
         limits_of(arguments),
         arguments.matcher,
     )
@@ -64,6 +67,7 @@ def run(arguments: argparse.Namespace) -> None:
             synthesizer=arguments.synthesizer,
             stop_on_damage=arguments.on_error == "stop",
         )
+        warm_up_beside(makers, _tell_compiling)
         with suppress(KeyboardInterrupt):
             serve(
                 broadcast,
@@ -74,6 +78,11 @@ def run(arguments: argparse.Namespace) -> None:
             )
     finally:
         maker.close()
+
+
+def _tell_compiling() -> None:
+    text = "compiling, once after an installation: the first pictures take longer"
+    print(f"mvcodec: {text}", file=sys.stderr, flush=True)
 
 
 def _announce(url: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from queue import Empty, Full, Queue
@@ -42,9 +43,6 @@ class LiveEncoding:
             out before they are coded (their numbers are missing in the file); ``block`` lets the
             input wait.
 
-    Attributes:
-        dropped: frame sets left out.
-
     Raises:
         SettingError: another policy.
     """
@@ -58,7 +56,12 @@ class LiveEncoding:
         self._output: Queue[list[Packet] | None] = Queue(WAITING_OUTPUT)
         self._failure: BaseException | None = None
         self._ended = threading.Event()
-        self.dropped = 0
+        self._dropped_by: Counter[str] = Counter()
+
+    @property
+    def dropped(self) -> int:
+        """Frame sets left out."""
+        return self._dropped_by.total()
 
     def run(
         self,
@@ -92,7 +95,7 @@ class LiveEncoding:
                     try:
                         self._input.put_nowait(frame_set)
                     except Full:
-                        self.dropped += 1
+                        self._dropped_by["reader"] += 1
                 else:
                     self._put_input(frame_set)
                 if self._ended.is_set():
@@ -120,7 +123,7 @@ class LiveEncoding:
                     raise item.error
                 return
             if self._drops and self._output.full():
-                self.dropped += 1
+                self._dropped_by["coder"] += 1  # each thread has a count of its own: += is two steps
                 continue
             self._put_output(self._encoder.push(item))
             on_frame()

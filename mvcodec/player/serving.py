@@ -25,6 +25,12 @@ KEPT_BYTES = 1 << 30
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
 """Of glibc's mallopt."""
 
+WILDCARDS = {
+    "0.0.0.0": (socket.AF_INET, "192.0.2.1", "127.0.0.1"),
+    "::": (socket.AF_INET6, "2001:db8::1", "::1"),
+}
+"""Hosts that stand for all addresses; an address elsewhere (of documents, nobody's), and loopback."""
+
 GRACE_S = 2
 """How long an interrupted server waits for its viewers' connections to close."""
 
@@ -50,7 +56,7 @@ def serve(
     """
     listener = _bind(host, port)
     with listener:
-        url = _url(host, listener.getsockname()[1])
+        url = page_url(host, listener.getsockname()[1])
         if not is_loopback(host):
             text = f"--host {host}: everyone who reaches this machine over the network can watch this file"
             warnings.warn(text, MvCodecWarning, stacklevel=2)
@@ -107,6 +113,18 @@ def _bind(host: str, port: int) -> socket.socket:
     return listener
 
 
-def _url(host: str, port: int) -> str:
-    shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+def page_url(host: str, port: int) -> str:
+    """Where the page is; of a host that stands for all addresses, one that others can use."""
+    shown = _reachable(host) if host in WILDCARDS else host
     return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
+
+
+def _reachable(wildcard: str) -> str:
+    """The address of this machine that others can use, loopback where it has none."""
+    family, elsewhere, loopback = WILDCARDS[wildcard]
+    with socket.socket(family, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((elsewhere, 9))  # sends nothing: it only chooses the way that packets would take
+            return str(probe.getsockname()[0])
+        except OSError:
+            return loopback

@@ -29,20 +29,21 @@ export function keyTable(player) {
     { keys: ["s"], text: "two eyes side by side", run: look("side-by-side") },
     { keys: ["n"], text: "nine views", run: look("mosaic") },
     { keys: ["[", "]"], text: "eyes nearer, farther apart", run: (event) => player.changeEyes(event.key === "[" ? -1 : 1) },
-    { keys: ["f"], text: "full screen", run: () => player.toggleFullscreen() },
-    { keys: ["h"], text: "hide the controls", run: () => player.toggleControls() },
-    { keys: ["?"], text: "these keys", run: () => player.toggleHelp() },
+    { keys: ["f"], early: true, text: "full screen", run: () => player.toggleFullscreen() },
+    { keys: ["h"], early: true, text: "hide the controls", run: () => player.toggleControls() },
+    { keys: ["?"], early: true, text: "these keys", run: () => player.toggleHelp() },
   ];
 }
 
-export function listenForKeys(table, help) {
+// `ready()`: whether the server has said what there is to see; until then only keys marked `early` answer.
+export function listenForKeys(table, help, ready) {
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (help.open && event.key !== "?") return;
     if (belongsTo(event.target, event.key)) return;
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     const found = table.find(({ keys }) => keys.includes(key === "=" ? "+" : key));
-    if (!found) return;
+    if (!found || !(found.early || ready())) return;
     event.preventDefault();
     found.run(event);
   });

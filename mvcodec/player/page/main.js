@@ -340,7 +340,7 @@ class Player {
     document.addEventListener("fullscreenchange", () => $("fullscreen").setAttribute("aria-pressed", Boolean(document.fullscreenElement)));
     window.addEventListener("hashchange", () => this.followLink());
     const table = keyTable(this);
-    listenForKeys(table, $("help"));
+    listenForKeys(table, $("help"), () => this.facts !== null);
     writeHelp($("keys"), table);
     for (const sign of ["pointermove", "pointerdown", "keydown", "focusin"]) document.addEventListener(sign, () => this.stir());
     const controls = $("controls");
