@@ -233,4 +233,3 @@ def test_files_of_ours_are_recordings_too(given: bool) -> None:
     else:
         assert not found.array.calibration.given
         assert found.calibration_note == "no calibration given"
-    found.close()

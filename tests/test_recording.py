@@ -52,10 +52,8 @@ def test_the_frame_rate_is_that_of_the_times(pipe: bool) -> None:
     assert recorded.array.fps == pytest.approx(10.0)
     assert (recorded.array.width, recorded.array.height) == (96, 64)
     assert not recorded.array.calibration.given
-    recorded.close()
     given = Recording(io.BytesIO(content), "rec", RecordingSettings(GRID, fps=25.0))
     assert given.array.fps == 25.0
-    given.close()
 
 
 def test_only_the_real_cameras_are_read() -> None:

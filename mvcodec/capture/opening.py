@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TypeVar
 
@@ -17,8 +16,8 @@ from mvcodec.capture.timing import Timing
 from mvcodec.capture.video_input import VideoView
 from mvcodec.capture.view_array import PictureView, ViewArray, ViewReader, check_sizes
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
+from mvcodec.workers import run_all
 
-_OPENERS = 2
 _Files = TypeVar("_Files")
 
 
@@ -150,8 +149,7 @@ def _open_videos(paths: Sequence[Path], grid: tuple[int, int] | None, real: str,
 def _open_views(
     files: dict[Position, _Files], opener: Callable[[_Files], ViewReader]
 ) -> dict[Position, ViewReader]:
-    with ThreadPoolExecutor(_OPENERS, "mvcodec-open") as pool:
-        views = dict(zip(files, pool.map(opener, files.values()), strict=True))
+    views = dict(zip(files, run_all(opener, files.values()), strict=True))
     check_sizes(views)
     for view in views.values():
         for note in view.notes:

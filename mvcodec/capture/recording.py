@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import chain
 from typing import BinaryIO
@@ -19,6 +18,7 @@ from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.recorded_pictures import RecordedPicture, RecordingReader
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet, Picture
+from mvcodec.workers import run_all
 
 MAX_WAITING = 64
 """Coded pictures of a camera that may wait for the other cameras'."""
@@ -32,7 +32,6 @@ TOLERANCE_SHARE = 0.25
 _FIRST_TOLERANCE_NS = 8_000_000
 """Default tolerance before the frame rate is known."""
 
-_DECODERS = 2
 _TOLD = 5
 """Dropped frames that are told one by one; the rest are counted."""
 
@@ -117,7 +116,6 @@ class Recording:
         self._reader = RecordingReader(file, name, list(self._topics), limits, on_damage)
         self._queues: dict[Position, deque[RecordedPicture]] = {p: deque() for p in self._topics.values()}
         self._decoders = {position: PictureDecoder(name) for position in self._queues}
-        self._pool = ThreadPoolExecutor(_DECODERS, "mvcodec-recording")
         self._fps = settings.fps or self._reader.fps
         self._tolerance_ns = self._find_tolerance()
         self._last_ns: int | None = None
@@ -137,25 +135,18 @@ class Recording:
     def frame_sets(self) -> Iterator[FrameSet]:
         """Frame sets in order, numbered from 0; a warning at the end counts what was dropped."""
         size = (self.array.height, self.array.width, 3)
-        try:
-            for index, (time_ns, pictures) in enumerate(chain(self._first, self._sets)):
-                for camera, picture in pictures.items():
-                    if picture.shape != size:
-                        found = f"a picture of {picture.shape[1]}x{picture.shape[0]} px"
-                        topic = self._settings.topics[camera[0]][camera[1]]
-                        label = f"{self.name}: {topic} at {time_ns / 1e9:.3f} s"
-                        raise InputError(label, found, f"{size[1]}x{size[0]} px as in the first frame set")
-                yield FrameSet(index, time_ns, pictures)
-            if self._reader.cut_off and self._last_ns is not None:
-                self._warn(f"cut off after {self._last_ns / 1e9:.3f} s")
-            if self._dropped > _TOLD:
-                self._warn(f"{self._dropped} pictures were dropped in all")
-        finally:
-            self.close()
-
-    def close(self) -> None:
-        """End the threads."""
-        self._pool.shutdown()
+        for index, (time_ns, pictures) in enumerate(chain(self._first, self._sets)):
+            for camera, picture in pictures.items():
+                if picture.shape != size:
+                    found = f"a picture of {picture.shape[1]}x{picture.shape[0]} px"
+                    topic = self._settings.topics[camera[0]][camera[1]]
+                    label = f"{self.name}: {topic} at {time_ns / 1e9:.3f} s"
+                    raise InputError(label, found, f"{size[1]}x{size[0]} px as in the first frame set")
+            yield FrameSet(index, time_ns, pictures)
+        if self._reader.cut_off and self._last_ns is not None:
+            self._warn(f"cut off after {self._last_ns / 1e9:.3f} s")
+        if self._dropped > _TOLD:
+            self._warn(f"{self._dropped} pictures were dropped in all")
 
     def _warn(self, text: str) -> None:
         warnings.warn(f"{self.name}: {text}", MvCodecWarning, stacklevel=3)
@@ -247,7 +238,7 @@ class Recording:
             return None
         heads = {position: queue.popleft() for position, queue in self._queues.items()}
         time_ns = next(iter(heads.values())).time_ns
-        pictures = dict(zip(heads, self._pool.map(self._decode, heads, heads.values()), strict=True))
+        pictures = dict(zip(heads, run_all(self._decode, heads, heads.values()), strict=True))
         missing = [position for position, picture in pictures.items() if picture is None]
         if missing or (self._last_ns is not None and time_ns <= self._last_ns):
             self._tell(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Protocol
 
@@ -14,8 +13,7 @@ from mvcodec.capture.source import resolve_frames
 from mvcodec.capture.truth import TruthFiles
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FrameSet, Picture
-
-_READERS = 2
+from mvcodec.workers import Job, settle, submit
 
 
 class ViewReader(Protocol):
@@ -111,23 +109,24 @@ class ViewArray:
             position: self._views[position].pictures([self._pairing.numbers[position][n] for n in numbers])
             for position in positions
         }
-        with ThreadPoolExecutor(_READERS, "mvcodec-read") as pool:
 
-            def start() -> dict[Position, Future[Picture]]:
-                return {position: pool.submit(next, stream) for position, stream in streams.items()}
+        def start() -> dict[Position, Job[Picture]]:
+            return {position: submit(next, stream) for position, stream in streams.items()}
 
-            ahead = start()
-            try:
-                for number in numbers:
-                    # A view's pictures are read one after the other: its stream is finished with
-                    # this frame before it is asked for the next.
-                    pictures = {position: future.result() for position, future in ahead.items()}
-                    if number + 1 in numbers:
-                        ahead = start()
-                    yield FrameSet(self.first_frame + number, self._pairing.times_ns[number], pictures)
-            finally:
-                for future in ahead.values():
-                    future.cancel()
+        ahead = start()
+        try:
+            for number in numbers:
+                # A view's pictures are read one after the other: its stream is finished with
+                # this frame before it is asked for the next.
+                settle(ahead.values())
+                pictures = {position: job.result() for position, job in ahead.items()}
+                if number + 1 in numbers:
+                    ahead = start()
+                yield FrameSet(self.first_frame + number, self._pairing.times_ns[number], pictures)
+        finally:
+            for job in ahead.values():
+                job.cancel()
+            settle(ahead.values())
 
     def truth(self, view: Position, frame: int) -> DisparityMap | None:
         """See ArraySource."""

@@ -30,6 +30,7 @@ OPTIONS = {
     "matcher": "--matcher",
     "preset": "--preset",
     "codec": "--codec",
+    "threads": "--threads",
 }
 """The options behind the library's settings."""
 

@@ -6,9 +6,9 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -40,6 +40,7 @@ from mvcodec.output.provenance_pictures import ProvenanceWriter
 from mvcodec.stream import StreamHeader
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.synthesizers import make_synthesizer
+from mvcodec.workers import run_all
 
 MOSAIC = "mosaic"
 MOSAIC_SUFFIXES = (".mp4", ".png")
@@ -47,7 +48,6 @@ MCAP = "mcap"
 FORMS_WITH_PROVENANCE = ("array", "png")
 """Those whose views are folders of pictures, which it can lie beside."""
 
-THREADS = 2
 
 Sink = Callable[[DecodedSet, list[RenderedView]], None]
 
@@ -97,7 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Decode, render every view of each frame set on both cores, write."""
+    """Decode, render every view of each frame set side by side, write."""
     synthesizer = make_synthesizer(arguments.synthesizer)
     form = arguments.format or ("png" if arguments.view else "array")
     if arguments.json and str(arguments.output) == STANDARD:
@@ -112,7 +112,6 @@ def run(arguments: argparse.Namespace) -> None:
         Decoder.open(
             source, arguments.frames, arguments.on_error, limits_of(arguments), arguments.matcher
         ) as decoder,
-        ThreadPoolExecutor(THREADS, "render") as pool,
         progress("decode", _frame_total(source, arguments.frames), quiet=arguments.quiet) as bar,
         ExitStack() as outputs,
     ):
@@ -122,7 +121,7 @@ def run(arguments: argparse.Namespace) -> None:
         frames = 0
         try:
             for decoded in decoder:
-                views = _render(synthesizer, decoded, plan.viewpoints, pool)
+                views = _render(synthesizer, decoded, plan.viewpoints)
                 if sink is None:
                     plan = replace(plan, first_frame=decoded.index)
                     sink = _open_sink(form, arguments, plan, outputs)
@@ -206,9 +205,9 @@ def _pictures(views: Sequence[RenderedView]) -> list[Picture]:
 
 
 def _render(
-    synthesizer: Synthesizer, decoded: DecodedSet, viewpoints: Sequence[Viewpoint], pool: ThreadPoolExecutor
+    synthesizer: Synthesizer, decoded: DecodedSet, viewpoints: Sequence[Viewpoint]
 ) -> list[RenderedView]:
-    return list(pool.map(lambda viewpoint: synthesizer.render(decoded, viewpoint), viewpoints))
+    return run_all(partial(synthesizer.render, decoded), viewpoints)
 
 
 def _plan(header: StreamHeader, arguments: argparse.Namespace) -> OutputPlan:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import re
 import warnings
 from importlib.util import find_spec
@@ -18,6 +17,7 @@ from mvcodec.cli.progress import progress
 from mvcodec.errors import MissingExtra, MvCodecWarning, OutputError
 from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codecs import ANCHOR_CODECS, CODECS
+from mvcodec.workers import thread_count
 
 if TYPE_CHECKING:
     from mvcodec.evaluation.study import Study
@@ -59,9 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--jobs",
         type=positive_int,
-        default=os.cpu_count() or 1,
         metavar="N",
-        help="anchors coded side by side (default: %(default)s)",
+        help="anchors coded side by side (default: as many as --threads)",
     )
     add_frames(parser, "frames of the input to evaluate")
     add_output_options(parser)
@@ -132,7 +131,7 @@ def _study(array: CameraArray, arguments: argparse.Namespace, range_px: tuple[fl
         synthesizer=arguments.synthesizer,
         anchors=arguments.anchors or tuple(ANCHORS),
         anchor_codecs=arguments.anchor_codecs or ANCHOR_CODECS,
-        jobs=arguments.jobs,
+        jobs=arguments.jobs or thread_count(),
     )
 
 

@@ -15,6 +15,7 @@ from mvcodec.cli.arguments import as_option, join_negative_values
 from mvcodec.cli.standard_streams import ReaderGone, checked_streams
 from mvcodec.cli.warning_lines import WarningLines
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
+from mvcodec.workers import THREADS_HELP, set_threads
 
 COMMANDS: dict[str, str] = {
     "sample": "render the sample scene as an array folder",
@@ -31,6 +32,9 @@ COMMANDS: dict[str, str] = {
     "evaluate": "measure rate and distortion of an array against stock codecs",
 }
 """Name and purpose; each lives in mvcodec.cli.<name> as add_arguments(parser) and run(arguments)."""
+
+COMPUTING = ("sample", "encode", "decode", "play", "render", "export-points", "compare", "evaluate")
+"""The commands with --threads."""
 
 EXIT_FAILURE = 1
 EXIT_USAGE = 2
@@ -73,6 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str]) -> int:
     parsed = _parser(arguments).parse_args(join_negative_values(arguments))
     try:
+        _use_threads(getattr(parsed, "threads", None))
         _module(parsed.command).run(parsed)
     except SettingError as error:
         return _fail(as_option(error), EXIT_USAGE)
@@ -88,7 +93,7 @@ def _run(arguments: Sequence[str]) -> int:
 def command_parser(name: str) -> argparse.ArgumentParser:
     """The parser of one command alone, with all its options; for its documents."""
     parser = OneLineParser(prog=f"mvcodec {name}", description=COMMANDS[name], allow_abbrev=False)
-    _module(name).add_arguments(parser)
+    _add_arguments(name, parser)
     return parser
 
 
@@ -103,8 +108,22 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
         # The options name the choices of the plug-in tables, whose import takes time: ask only the
         # command that is meant.
         if name in arguments:
-            _module(name).add_arguments(command)
+            _add_arguments(name, command)
     return parser
+
+
+def _add_arguments(name: str, parser: argparse.ArgumentParser) -> None:
+    _module(name).add_arguments(parser)
+    if name in COMPUTING:
+        parser.add_argument("--threads", type=int, metavar="N", help=THREADS_HELP)
+
+
+def _use_threads(count: int | None) -> None:
+    set_threads(count)
+    if count is not None:
+        import cv2
+
+        cv2.setNumThreads(count)
 
 
 def _module(command: str) -> Any:

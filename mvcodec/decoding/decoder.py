@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO, Literal, get_args
 
+from mvcodec import workers
 from mvcodec.array import Position
 from mvcodec.closing import Closing
 from mvcodec.container import McapReader
@@ -33,8 +33,7 @@ from mvcodec.video.colour import to_picture
 from mvcodec.video.disparity_code import dequantise
 from mvcodec.video.map_size import enlarged, small_size, track_sizes
 from mvcodec.video.track import TrackDecoder
-
-WORKERS = 2
+from mvcodec.workers import Job, check_threads, run_all, settle, submit
 
 OnError = Literal["skip", "stop"]
 
@@ -54,6 +53,7 @@ class Decoder(Closing):
         matcher: estimates the maps of a stream that holds none, by name or one's own; by default the one
             that the stream's settings name. It runs when the first map of a frame set is looked at.
         name: what messages call the stream.
+        threads: how many decode at once; by default as set for the process. It changes no picture.
 
     Raises:
         SettingError: another policy, or (where a stream needs it) no matcher of that name.
@@ -65,6 +65,7 @@ class Decoder(Closing):
         limits: Limits = DEFAULT_LIMITS,
         matcher: str | Matcher | None = None,
         name: str = "stream",
+        threads: int | None = None,
     ) -> None:
         if on_error not in get_args(OnError):
             raise SettingError("on_error", on_error, " or ".join(get_args(OnError)))
@@ -74,7 +75,8 @@ class Decoder(Closing):
         self._decoders: dict[Track, TrackDecoder] = {}
         self._absent: frozenset[Position] = frozenset()
         self._skipping = False
-        self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(WORKERS, "decode")
+        check_threads(threads)
+        self._threads, self._open = threads, True
         self._reader: McapReader | None = None
         self._frames: slice | None = None
         self._name = name
@@ -88,20 +90,21 @@ class Decoder(Closing):
         on_error: OnError = "stop",
         limits: Limits = DEFAULT_LIMITS,
         matcher: str | Matcher | None = None,
+        threads: int | None = None,
     ) -> Decoder:
         """A decoder of a file, pipe or standard input, to iterate over.
 
         Args:
             source: path, URL of a file on a web server, or a binary file that may be a pipe and stays open.
             frames: Python slice over the frame sets that the file holds (from 0), step 1.
-            on_error, limits, matcher: as the constructor's.
+            on_error, limits, matcher, threads: as the constructor's.
 
         Raises:
             InputError: the system refuses to open it.
             StreamError: not an MCAP file, none of ours, or one of a newer format version.
             SettingError (on iterating): the slice is empty.
         """
-        decoder = cls(on_error, limits, matcher)
+        decoder = cls(on_error, limits, matcher, threads=threads)
         try:
             decoder._reader = McapReader.open(source, limits, _warn if on_error == "skip" else None)
             decoder._name = decoder._reader.name
@@ -170,7 +173,7 @@ class Decoder(Closing):
             StreamError: damage, with topic and time.
             StreamClosed: after `flush`.
         """
-        if self._pool is None:
+        if not self._open:
             raise StreamClosed("the decoder was flushed; it takes no more packets")
         if packet.track.kind is TrackKind.HEADER:
             return self._push_header(packet)
@@ -185,7 +188,7 @@ class Decoder(Closing):
 
     def flush(self) -> list[DecodedSet]:
         """End the stream. Returns what waits for missing packets; `push` is an error from now on."""
-        done = [] if self._pool is None else self._decode_all(self._assembler.flush())
+        done = self._decode_all(self._assembler.flush()) if self._open else []
         self._end()
         return done
 
@@ -196,9 +199,7 @@ class Decoder(Closing):
             self._reader.close()
 
     def _end(self) -> None:
-        if self._pool is not None:
-            self._pool.shutdown()
-            self._pool = None
+        self._open = False
 
     def _push_header(self, packet: Packet) -> list[DecodedSet]:
         """A keyframe begins, where all that was lost is found again."""
@@ -227,7 +228,8 @@ class Decoder(Closing):
         done = []
         for packets in sets:
             try:
-                done += self._decode(packets)
+                with workers.threads(self._threads):
+                    done += self._decode(packets)
             except StreamError as error:
                 self._skip(error)
         return done
@@ -249,9 +251,8 @@ class Decoder(Closing):
         senders = [camera for camera in self.header.map_cameras if camera not in reasons]
         if not (senders or (self._matcher and can_be_estimated(array, there))):
             return []
-        assert self._pool is not None
         textures = [planes[Track(TrackKind.TEXTURE, camera)] for camera in there]
-        pictures = dict(zip(there, self._pool.map(self._picture, textures), strict=True))
+        pictures = dict(zip(there, run_all(self._picture, textures), strict=True))
         disparities: Mapping[Position, DisparityMap]
         if self._matcher is None:
             disparities = self._sent_maps(planes, there, senders, pictures)
@@ -271,21 +272,19 @@ class Decoder(Closing):
         pictures: Mapping[Position, Picture],
     ) -> dict[Position, DisparityMap]:
         """The maps of the cameras that are there: as sent, and of those that send none as derived."""
-        assert self._pool is not None
         maps = [planes[Track(TrackKind.DISPARITY, camera)] for camera in senders]
-        found = self._pool.map(self._map, maps, [pictures[camera] for camera in senders])
+        found = run_all(self._map, maps, [pictures[camera] for camera in senders])
         sent = dict(zip(senders, found, strict=True))
         others = [camera for camera in there if camera not in sent]
         span = self.header.disparity_range_px
-        derived = self._pool.map(partial(derive_map, self.header.array, sent, span), others)
+        derived = run_all(partial(derive_map, self.header.array, sent, span), others)
         known = sent | dict(zip(others, derived, strict=True))
         return {camera: known[camera] for camera in there}
 
     def _planes(self, packets: PacketSet) -> tuple[dict[Track, Planes], dict[Position, StreamError]]:
         """Decode every track. What is missing is a reason why its camera is absent; damage is raised."""
-        assert self._pool is not None
-        jobs: dict[Track, Future[Planes]] = {
-            track: self._pool.submit(
+        jobs: dict[Track, Job[Planes]] = {
+            track: submit(
                 self._decoders[track].push,
                 packet.data,
                 packet.keyframe,
@@ -294,7 +293,7 @@ class Decoder(Closing):
             )
             for track, packet in packets.packets.items()
         }
-        wait(jobs.values())
+        settle(jobs.values())
         planes: dict[Track, Planes] = {}
         reasons: dict[Position, StreamError] = {}
         for track in packets.missing:

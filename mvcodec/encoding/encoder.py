@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import asdict
 from types import TracebackType
 from typing import Any, Self
@@ -36,10 +35,9 @@ from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import even_size, grey_planes, to_planes
 from mvcodec.video.disparity_code import quantise
 from mvcodec.video.map_size import coded_size, to_coded
+from mvcodec.workers import Job, settle, submit, threads
 
 __all__ = ["Encoder", "EncoderConfig", "default_gop", "find_matcher"]
-
-WORKERS = 2
 
 KEYFRAME_NS = 1_000_000_000
 """A keyframe comes after this time at the latest, whatever the nominal frame rate says."""
@@ -89,7 +87,7 @@ class Encoder:
         self._key_ns = 0
         self._last: FrameSet | None = None
         self._maps: Mapping[Position, DisparityMap] = {}
-        self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(WORKERS, "encode")
+        self._open = True
 
     @property
     def header(self) -> StreamHeader | None:
@@ -106,7 +104,7 @@ class Encoder:
             InputError: a real camera's picture is missing or of the wrong shape, or time goes back.
             StreamClosed: after `flush`.
         """
-        if self._pool is None:
+        if not self._open:
             raise StreamClosed("the encoder was flushed; it takes no more frame sets")
         self._check(frames)
         if self._header is None:
@@ -118,11 +116,12 @@ class Encoder:
             position = 0  # frame sets came more slowly than their nominal rate
         if self._last is not None and frames.index != self._last.index + 1 and not self._codec.numbered:
             position = 0  # else what was left out would look like what was lost
-        jobs: dict[Track, Future[list[CodedPicture]]] = {}
+        jobs: dict[Track, Job[list[CodedPicture]]] = {}
         try:
-            self._submit(self._pool, frames, position == 0, jobs)
+            with threads(self.config.threads):
+                self._submit(frames, position == 0, jobs)
         finally:
-            wait(jobs.values())
+            settle(jobs.values())
         packets = [_packet(track, frames, job.result()) for track, job in jobs.items()]
         if position == 0:
             self._key_ns = frames.time_ns
@@ -138,16 +137,15 @@ class Encoder:
 
     def _submit(
         self,
-        pool: ThreadPoolExecutor,
         frames: FrameSet,
         keyframe: bool,
-        jobs: dict[Track, Future[list[CodedPicture]]],
+        jobs: dict[Track, Job[list[CodedPicture]]],
     ) -> None:
         """Start coding all tracks; the pictures are coded while the matcher runs."""
         pictures = {camera: frames.pictures[camera] for camera in self.array.real}
         for camera, picture in pictures.items():
             track = Track(TrackKind.TEXTURE, camera)
-            jobs[track] = pool.submit(self._code_picture, track, picture, keyframe)
+            jobs[track] = submit(self._code_picture, track, picture, keyframe)
         assert self._header is not None
         if not (self._header.map_cameras or self.config.depth):
             return
@@ -156,13 +154,12 @@ class Encoder:
         self._maps = values
         for camera in self._header.map_cameras:
             track = Track(TrackKind.DISPARITY, camera)
-            jobs[track] = pool.submit(self._code_map, track, values[camera], keyframe)
+            jobs[track] = submit(self._code_map, track, values[camera], keyframe)
 
     def flush(self) -> list[Packet]:
         """End the stream. Returns nothing, since no packet waits; `push` is an error from now on."""
-        if self._pool is not None:
-            self._pool.shutdown()
-            self._pool = None
+        if self._open:
+            self._open = False
             for encoder in self._encoders.values():
                 encoder.flush()
         return []

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
+from mvcodec import workers
 from mvcodec.array import CameraArray, Position
 from mvcodec.capture import ArraySource, resolve_frames
 from mvcodec.evaluation.quality import Comparison, QualityMeter
@@ -16,8 +16,6 @@ from mvcodec.stream import TrackKind
 from mvcodec.video.codec import Codec, Planes, RateControl, VideoSettings
 from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import even_size, to_picture, to_planes
-
-THREADS = 2
 
 Tour = tuple[Position, ...]
 """Views in the order in which one video sequence goes through them; backwards at every other time."""
@@ -98,7 +96,7 @@ def code_array(
     rate: RateControl,
     gop: int,
     preset: str = "medium",
-    threads: int = THREADS,
+    threads: int | None = None,
     on_picture: Callable[[], object] | None = None,
 ) -> CodedArray:
     """Code every view of the grid in an anchor's order and measure the decoded pictures.
@@ -111,7 +109,7 @@ def code_array(
     Args:
         codec: a name of `CODECS`; rate is on its scale.
         rate, gop, preset: as the compared encoding uses them for pictures; gop in frame sets.
-        threads: sequences coded side by side.
+        threads: sequences coded side by side; by default as set for the process.
         on_picture: called, from any thread, after each picture that was coded or measured: twice
             for each picture.
 
@@ -123,12 +121,8 @@ def code_array(
     meter = QualityMeter(source.array.real)
     job = _Job(source, chosen, find_codec(codec), meter, on_picture or (lambda: None))
     settings = partial(sequence_settings, source.array, anchor, rate=rate, gop=gop, preset=preset)
-    with ThreadPoolExecutor(threads) as pool:
-        futures = [pool.submit(job.code, tour, settings(tour)) for tour in anchor.tours(source.array)]
-        try:
-            costs = [future.result() for future in futures]
-        finally:
-            pool.shutdown(cancel_futures=True)
+    with workers.threads(threads):
+        costs = workers.run_all(lambda tour: job.code(tour, settings(tour)), anchor.tours(source.array))
     return CodedArray(
         bits=sum(cost.bits for cost in costs),
         frames=len(chosen),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -20,8 +19,8 @@ from mvcodec.evaluation.stopwatch import Stopwatch
 from mvcodec.frames import DecodedSet, FrameSet, Picture
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.synthesis.synthesizer import Synthesizer
+from mvcodec.workers import run_all
 
-THREADS = 2
 BATCH = 16
 """Synthesised pictures held at a time."""
 
@@ -104,7 +103,7 @@ def _measure(
     positions = source.array.positions
     meter = QualityMeter(source.array.real)
     originals = source.frame_sets(slice(chosen.start, chosen.stop), positions)
-    with Decoder.open(file) as decoder, ThreadPoolExecutor(THREADS) as pool:
+    with Decoder.open(file) as decoder:
         decoded_sets = iter(decoder)
         for frame_set in originals:
             with clock:
@@ -114,8 +113,8 @@ def _measure(
             for start in range(0, len(positions), BATCH):
                 views = positions[start : start + BATCH]
                 with clock:
-                    pictures = list(pool.map(partial(_render, synthesizer, decoded), views))
-                list(pool.map(partial(_compare, meter, frame_set), views, pictures))
+                    pictures = run_all(partial(_render, synthesizer, decoded), views)
+                run_all(partial(_compare, meter, frame_set), views, pictures)
                 _repeat(on_picture, views)
     return meter.result()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -19,8 +18,7 @@ from mvcodec.evaluation.metrics import ssim_picture
 from mvcodec.evaluation.quality import Comparison, QualityMeter, ViewQuality
 from mvcodec.evaluation.quality_by_provenance import ProvenanceMeter, read_seen_by
 from mvcodec.frames import FrameSet, Picture
-
-THREADS = 2
+from mvcodec.workers import run_all
 
 
 def compare(
@@ -68,15 +66,14 @@ def compare(
             number = theirs.index - decoded.first_frame
             by_cameras.push(*pictures, read_seen_by(provenance, view, number, decoded.array))
 
-    with ThreadPoolExecutor(THREADS) as pool:
-        for ours, theirs in zip(
-            original.frame_sets(_own_slice(original, first, chosen), positions),
-            decoded.frame_sets(_own_slice(decoded, first, chosen), positions),
-            strict=True,
-        ):
-            list(pool.map(partial(measure, ours, theirs), positions))
-            if on_frame is not None:
-                on_frame()
+    for ours, theirs in zip(
+        original.frame_sets(_own_slice(original, first, chosen), positions),
+        decoded.frame_sets(_own_slice(decoded, first, chosen), positions),
+        strict=True,
+    ):
+        run_all(partial(measure, ours, theirs), positions)
+        if on_frame is not None:
+            on_frame()
     views = tuple(sequences[view.position].added_to(view) for view in meter.result().views)
     return Comparison(views, None if provenance is None else by_cameras.result())
 

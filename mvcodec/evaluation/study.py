@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
@@ -28,6 +27,7 @@ from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codec import RateControl
 from mvcodec.video.codecs import ANCHOR_CODECS, CODECS, find_codec
 from mvcodec.video.pyav import library_versions
+from mvcodec.workers import Job, settle, submit, threads
 
 OURS = "mvcodec"
 
@@ -159,19 +159,24 @@ class StudyRun:
             SettingError, InputError, OutputError: as the stages raise them.
         """
         points: dict[str, list[CurvePoint]] = {}
-        futures: dict[str, list[Future[CurvePoint]]] = {}
-        with ThreadPoolExecutor(self.study.jobs) as pool, self._maps:
+        waiting: dict[str, list[Job[CurvePoint]]] = {}
+        with self._maps:
             try:
                 for curve in self.study.curves:
                     if curve.anchor is None:
                         points[curve.name] = [self._point(curve, qp) for qp in curve.qps]
-                    else:
-                        futures[curve.name] = [pool.submit(self._point, curve, qp) for qp in curve.qps]
-                for name, jobs in futures.items():
+                with threads(self.study.jobs):
+                    for curve in self.study.curves:
+                        if curve.anchor is not None:
+                            waiting[curve.name] = [submit(self._point, curve, qp) for qp in curve.qps]
+                for name, jobs in waiting.items():
                     points[name] = [job.result() for job in jobs]
             except BaseException:
                 self._stop.set()
-                pool.shutdown(cancel_futures=True)
+                left = [job for jobs in waiting.values() for job in jobs]
+                for job in left:
+                    job.cancel()
+                settle(left)
                 raise
         return points
 
@@ -180,6 +185,7 @@ class StudyRun:
         if curve.anchor is None:
             settings = {**asdict(replace(self.study.config, qp=qp)), "gop": self.gop}
             settings |= settings.pop("rate")
+            del settings["threads"]  # which changes no bit
             return {**settings, "synthesizer": self.study.synthesizer}
         tour = curve.anchor.tours(self.source.array)[0]
         settings = find_codec(curve.codec).options(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
@@ -16,11 +15,11 @@ from mvcodec.frames import FloatMap, Picture
 from mvcodec.output.atomic import write_bytes
 from mvcodec.output.pictures import write_pfm, write_png
 from mvcodec.stream import view_name
+from mvcodec.workers import settle, submit
 
 MANIFEST_NAME = "array.json"
 PICTURE_PATTERN = "r{row:02d}_c{col:02d}/{frame:06d}.png"
 VIDEO_PATTERN = "r{row:02d}_c{col:02d}.mp4"
-_WRITERS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +98,6 @@ class ArrayFolderWriter:
         self._positions = {(row, col) for row in range(facts.rows) for col in range(facts.cols)}
         self._with_truth: set[Position] = set()
         self._closed = False
-        self._pool = ThreadPoolExecutor(_WRITERS, "mvcodec-write")
 
     def push(
         self, pictures: Mapping[Position, Picture], truth: Mapping[Position, FloatMap] | None = None
@@ -123,13 +121,14 @@ class ArrayFolderWriter:
             self._with_truth = set(truth)
         number = self.frame_count
         jobs = [
-            self._pool.submit(write_png, self.folder / view_name(view) / f"{number:06d}.png", picture)
+            submit(write_png, self.folder / view_name(view) / f"{number:06d}.png", picture)
             for view, picture in pictures.items()
         ]
         jobs += [
-            self._pool.submit(write_pfm, self.folder / _truth_pattern(view).format(frame=number), values)
+            submit(write_pfm, self.folder / _truth_pattern(view).format(frame=number), values)
             for view, values in truth.items()
         ]
+        settle(jobs)
         for job in jobs:
             job.result()
         self.frame_count += 1
@@ -173,7 +172,6 @@ class ArrayFolderWriter:
     def abort(self) -> None:
         """Stop without an `array.json`; pictures already written stay."""
         self._closed = True
-        self._pool.shutdown()
 
     def __enter__(self) -> ArrayFolderWriter:
         return self

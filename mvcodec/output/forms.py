@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,8 +19,7 @@ from mvcodec.output.mosaic import mosaic
 from mvcodec.output.pictures import viewpoint_name, write_png
 from mvcodec.output.video_file import Mp4Writer
 from mvcodec.stream import view_name
-
-_WRITERS = 2
+from mvcodec.workers import run_all
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,17 +118,15 @@ class PictureForm(Closing):
     def __init__(self, target: Path, plan: OutputPlan) -> None:
         self._folders = [target / name for name in plan.names]
         self._count = 0
-        self._pool = ThreadPoolExecutor(_WRITERS, "mvcodec-write")
 
     def push(self, pictures: Sequence[Picture]) -> None:
         """See ViewWriter."""
         paths = [folder / f"{self._count:06d}.png" for folder in self._folders]
-        list(self._pool.map(write_png, paths, pictures))
+        run_all(write_png, paths, pictures)
         self._count += 1
 
     def close(self) -> None:
         """Every picture is complete already."""
-        self._pool.shutdown()
 
 
 class VideoForm:
@@ -143,12 +139,11 @@ class VideoForm:
                 stack.enter_context(Mp4Writer(target / f"{name}.mp4", array.width, array.height, array.fps))
                 for name in plan.names
             ]
-            self._pool = stack.enter_context(ThreadPoolExecutor(_WRITERS, "mvcodec-write"))
             self._resources = stack.pop_all()
 
     def push(self, pictures: Sequence[Picture]) -> None:
         """See ViewWriter."""
-        list(self._pool.map(Mp4Writer.push, self._writers, pictures))
+        run_all(Mp4Writer.push, self._writers, pictures)
 
     def close(self) -> None:
         """Finish every file."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import BinaryIO
 
@@ -15,6 +14,7 @@ from mvcodec.stream import TrackKind
 from mvcodec.video.codec import CodedPicture, RateControl, VideoEncoder, VideoSettings
 from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import even_size, to_planes
+from mvcodec.workers import run_all
 
 CODEC = "h264"
 CRF = 18.0
@@ -22,7 +22,6 @@ PRESET = "veryfast"
 """As good as the eye asks for, and fast enough to keep up with the decoder."""
 
 _KEYFRAME_NS = 1_000_000_000
-_WORKERS = 2
 
 
 class McapViews(Closing):
@@ -45,7 +44,6 @@ class McapViews(Closing):
         )
         self._encoders = [find_codec(CODEC).encoder(settings) for _ in views]
         self._since, self._key_ns = 0, 0
-        self._pool = ThreadPoolExecutor(_WORKERS, "mvcodec-views")
 
     def push(self, pictures: Sequence[Picture], index: int, time_ns: int) -> None:
         """Write uint8 (H, W, 3) RGB of each viewpoint, taken at a time.
@@ -62,10 +60,9 @@ class McapViews(Closing):
             (coded,) = encoder.push(to_planes(picture), keyframe)
             return coded
 
-        units = [coded.data for coded in self._pool.map(code, self._encoders, pictures)]
+        units = [coded.data for coded in run_all(code, self._encoders, pictures)]
         self._writer.push(index, time_ns, keyframe, units)
 
     def close(self) -> None:
         """Complete the file."""
-        self._pool.shutdown()
         self._writer.close()

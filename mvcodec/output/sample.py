@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 from mvcodec.array import Position, Viewpoint
 from mvcodec.frames import FloatMap, Picture
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.scenes.scene import DEFAULT_SCENE, Scene, SceneSettings, make_scene
-
-_RENDERERS = 2
+from mvcodec.workers import run_all
 
 
 def write_sample(
@@ -40,9 +39,9 @@ def write_sample(
     """
     made = make_scene(scene, settings)
     facts = ArrayFacts.of(made.array, licence=made.licence)
-    with ArrayFolderWriter(folder, facts) as writer, ThreadPoolExecutor(_RENDERERS, "mvcodec-render") as pool:
+    with ArrayFolderWriter(folder, facts) as writer:
         for frame in range(made.frame_count):
-            views = list(pool.map(lambda view, at=frame: _rendered(made, view, at), made.array.positions))
+            views = run_all(partial(_rendered, made, frame=frame), made.array.positions)
             pictures: dict[Position, Picture] = {view: picture for view, picture, _ in views}
             truth: dict[Position, FloatMap] = {
                 view: disparity for view, _, disparity in views if with_truth and disparity is not None

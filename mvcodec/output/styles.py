@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import islice, tee
 
@@ -19,8 +18,8 @@ from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.output import light_field, stereoscopic
 from mvcodec.output.mosaic import mosaic
 from mvcodec.synthesis.synthesizer import Synthesizer
+from mvcodec.workers import Job, submit
 
-THREADS = 2
 AHEAD = 3
 """Views rendered or being rendered that nobody has taken yet."""
 
@@ -190,25 +189,24 @@ STYLES: dict[str, Callable[[ShotSettings], Shot]] = {
 def take(
     shot: Shot, moments: Iterable[tuple[DecodedSet, Viewpoint]], synthesizer: Synthesizer
 ) -> Iterator[Picture]:
-    """The picture of each moment, in order; views are rendered ahead on both cores.
+    """The picture of each moment, in order; views are rendered ahead, side by side.
 
     Raises:
         SettingError: a viewpoint outside the array; and what `moments` raises.
     """
     to_render, to_compose = tee(moments)
     jobs = ((decoded, place) for decoded, viewpoint in to_render for place in shot.places(viewpoint))
-    with ThreadPoolExecutor(THREADS, "render") as pool:
-        views = _rendered(pool, synthesizer, jobs)
-        for _, viewpoint in to_compose:
-            yield shot.compose(viewpoint, islice(views, len(shot.places(viewpoint))))
+    views = _rendered(synthesizer, jobs)
+    for _, viewpoint in to_compose:
+        yield shot.compose(viewpoint, islice(views, len(shot.places(viewpoint))))
 
 
 def _rendered(
-    pool: ThreadPoolExecutor, synthesizer: Synthesizer, jobs: Iterable[tuple[DecodedSet, Viewpoint]]
+    synthesizer: Synthesizer, jobs: Iterable[tuple[DecodedSet, Viewpoint]]
 ) -> Iterator[RenderedView]:
-    waiting: deque[Future[RenderedView]] = deque()
+    waiting: deque[Job[RenderedView]] = deque()
     for decoded, place in jobs:
-        waiting.append(pool.submit(synthesizer.render, decoded, place))
+        waiting.append(submit(synthesizer.render, decoded, place))
         if len(waiting) >= AHEAD:
             yield waiting.popleft().result()
     while waiting:

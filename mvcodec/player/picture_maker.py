@@ -25,7 +25,9 @@ from mvcodec.player.session import PictureRequest
 from mvcodec.player.synthesizer_pool import SynthesizerPool
 from mvcodec.synthesis.synthesizer import Preparing, Synthesizer
 
-WORKERS = 2
+PICTURES_AT_ONCE = 2
+"""More would wait for each other: each picture is made by all threads of the process."""
+
 JPEG_QUALITY = 90
 
 
@@ -47,7 +49,7 @@ class MadePicture:
 
 
 class PictureMaker:
-    """Makes pictures of one file, in as many as `WORKERS` threads at once.
+    """Makes pictures of one file, in as many as `PICTURES_AT_ONCE`.
 
     Args:
         path: the file.
@@ -76,8 +78,8 @@ class PictureMaker:
         self.store = FrameStore(path, limits=limits, matcher=matcher)
         self.originals: Originals | None = None
         self.levels = SMALLER if make_quick is None else QUICKER
-        self._synthesizers = SynthesizerPool(make_synthesizer, WORKERS + 1)
-        self._quick = SynthesizerPool(make_quick or make_synthesizer, WORKERS + 1)
+        self._synthesizers = SynthesizerPool(make_synthesizer, PICTURES_AT_ONCE + 1)
+        self._quick = SynthesizerPool(make_quick or make_synthesizer, PICTURES_AT_ONCE + 1)
         self._drafts = _Drafts()
         self._ahead = ThreadPoolExecutor(1, "ahead")
         self._coming: tuple[int, Future[None]] | None = None
@@ -187,7 +189,7 @@ class _Drafts:
     """The frame sets shrunk last; synthesizers know by identity what they have prepared."""
 
     def __init__(self) -> None:
-        self._held: deque[tuple[DecodedSet, float, DecodedSet]] = deque(maxlen=WORKERS + 2)
+        self._held: deque[tuple[DecodedSet, float, DecodedSet]] = deque(maxlen=PICTURES_AT_ONCE + 2)
         self._lock = threading.Lock()
 
     def of(self, decoded: DecodedSet, scale: float) -> DecodedSet:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.scenes.solids import Rectangle, Shape, Sphere, Vector
+from mvcodec.workers import run_in_bands
 
 if TYPE_CHECKING:
     from mvcodec.kernels.illumination import Rays, Solids
 
-_THREADS = 2
 _GAMMA = 2.2
 _TEXEL_M = 0.07
 _MAX_SIDE = 128
@@ -191,9 +190,7 @@ def _gathered(places: _Places, blocked: NDArray[np.bool_], rays: Rays) -> NDArra
 
 def _in_bands(run: Callable[[slice], None], count: int) -> None:
     """Call `run` on equal parts of 0..count, one in each thread."""
-    bounds = np.linspace(0, count, _THREADS + 1).astype(int)
-    with ThreadPoolExecutor(_THREADS, "mvcodec-light") as pool:
-        list(pool.map(run, [slice(bounds[part], bounds[part + 1]) for part in range(_THREADS)]))
+    run_in_bands(count, lambda first, last: run(slice(first, last)))
 
 
 def _middles(count: int) -> NDArray[np.float64]:

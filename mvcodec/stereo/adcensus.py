@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -20,8 +19,8 @@ from numpy.typing import NDArray
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.stereo.consistency import median
+from mvcodec.workers import run_in_bands
 
-_BANDS = 2
 _CENSUS_RADIUS_X, _CENSUS_RADIUS_Y = 4, 3
 _OUTSIDE_COST = 1.0
 """Where a pixel would lie outside the other picture: half of the largest cost, since nothing is known."""
@@ -263,6 +262,4 @@ def _mirror(pixels: NDArray[Any]) -> NDArray[Any]:
 
 def _in_bands(length: int, work: Callable[..., object], output: NDArray[Any]) -> None:
     """Run `work(start, stop, output)` over bands of 0..length-1, side by side."""
-    edges = np.linspace(0, length, _BANDS + 1).astype(int).tolist()
-    with ThreadPoolExecutor(_BANDS) as pool:
-        list(pool.map(lambda start, stop: work(start, stop, output), edges[:-1], edges[1:]))
+    run_in_bands(length, lambda start, stop: work(start, stop, output))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -17,8 +16,9 @@ from mvcodec.errors import MvCodecWarning, SettingError
 from mvcodec.frames import FloatMap, FrameSet, Mask, Picture
 from mvcodec.stereo.ambiguity import unambiguous
 from mvcodec.stereo.consistency import drop_speckles, left_right_check
-from mvcodec.stereo.pairwise import THREADS, CameraPair, camera_pairs, transposed
+from mvcodec.stereo.pairwise import CameraPair, camera_pairs, transposed
 from mvcodec.stereo.sgbm import Sgbm, SgbmSettings
+from mvcodec.workers import run_all
 
 FALLBACK_RANGE_PX = (0.0, 16.0)
 """Of pictures in which nothing can be matched: any range does, a small one costs least."""
@@ -165,8 +165,7 @@ def _trimmed(picture: Picture) -> Picture:
 
 
 def _search(jobs: Sequence[_Job], width: int, span_px: tuple[float, float] | None) -> list[_Found]:
-    with ThreadPoolExecutor(THREADS) as pool:
-        return list(pool.map(lambda job: _search_pair(job, width, span_px), jobs))
+    return run_all(lambda job: _search_pair(job, width, span_px), jobs)
 
 
 def _search_pair(job: _Job, width: int, span_px: tuple[float, float] | None) -> _Found:

@@ -11,7 +11,6 @@ is connected with best.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
@@ -27,6 +26,7 @@ from mvcodec.stereo.exposure import camera_gains
 from mvcodec.stereo.matching_view import MatchingView, prepare_views
 from mvcodec.stereo.partners import neighbours, outside, partners, steps, unseen_border
 from mvcodec.stereo.subpixel import refine
+from mvcodec.workers import run_all
 
 THREADS = 2
 LEVELS_MULTIPLE = 8
@@ -133,38 +133,36 @@ class Joint:
             flat = DisparityMap(np.full(shape, range_px[0], np.float32), np.zeros(shape, np.bool_))
             return dict.fromkeys(array.real, flat)
         ones = {camera: np.ones(3, np.float32) for camera in array.real}
-        with ThreadPoolExecutor(THREADS) as pool:
 
-            def matched(
-                array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
-            ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
-                return self._matched(array, prepare_views(array, pictures, ones, pool), range_px, pool)
+        def matched(
+            array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
+        ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
+            return self._matched(array, prepare_views(array, pictures, ones), range_px)
 
-            gains = camera_gains(array, pictures, range_px, matched)
-            views = prepare_views(array, pictures, gains, pool)
-            maps, valid = self._refined_maps(array, views, range_px, pool)
-            extended = pool.map(
-                lambda camera: self._beyond_partners(
-                    array, camera, views[camera], valid[camera], np.clip(maps[camera], *range_px)
-                ),
-                array.real,
-            )
-            return {
-                camera: DisparityMap(values, valid[camera])
-                for camera, values in zip(array.real, extended, strict=True)
-            }
+        gains = camera_gains(array, pictures, range_px, matched)
+        views = prepare_views(array, pictures, gains)
+        maps, valid = self._refined_maps(array, views, range_px)
+        extended = run_all(
+            lambda camera: self._beyond_partners(
+                array, camera, views[camera], valid[camera], np.clip(maps[camera], *range_px)
+            ),
+            array.real,
+        )
+        return {
+            camera: DisparityMap(values, valid[camera])
+            for camera, values in zip(array.real, extended, strict=True)
+        }
 
     def _refined_maps(
         self,
         array: CameraArray,
         views: Mapping[Position, MatchingView],
         range_px: tuple[float, float],
-        pool: Executor,
     ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
         """Maps that are complete and sub-pixel, and where another camera confirms them."""
         low, levels = _levels(range_px)
-        raw, valid = self._matched(array, views, range_px, pool)
-        completed = pool.map(
+        raw, valid = self._matched(array, views, range_px)
+        completed = run_all(
             lambda camera: self._complete(array, camera, views[camera], raw, valid, low, levels),
             array.real,
         )
@@ -173,7 +171,7 @@ class Joint:
             for camera, values in zip(array.real, completed, strict=True)
         }
         for _ in range(self.settings.subpixel_steps):
-            refined = pool.map(partial(_refined, array, views, maps, valid), array.real)
+            refined = run_all(partial(_refined, array, views, maps, valid), array.real)
             maps = dict(zip(array.real, refined, strict=True))
         return maps, valid
 
@@ -182,11 +180,10 @@ class Joint:
         array: CameraArray,
         views: Mapping[Position, MatchingView],
         range_px: tuple[float, float],
-        pool: Executor,
     ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
         """The disparity of every camera by its own pictures, and where another camera confirms it."""
         low, levels = _levels(range_px)
-        decided = pool.map(lambda camera: self._decide(array, camera, views, low, levels), array.real)
+        decided = run_all(lambda camera: self._decide(array, camera, views, low, levels), array.real)
         raw = dict(zip(array.real, decided, strict=True))
         return raw, {camera: self._confirmed(array, camera, raw, range_px) for camera in array.real}
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import cv2
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.frames import FloatMap, Picture
+from mvcodec.workers import run_all
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,14 +37,13 @@ def prepare_views(
     array: CameraArray,
     pictures: Mapping[Position, Picture],
     gains: Mapping[Position, NDArray[np.float32]],
-    pool: Executor,
 ) -> dict[Position, MatchingView]:
     """The real cameras' pictures, side by side.
 
     Args:
         gains: float32 (3,) of each camera, what its R, G and B are multiplied by.
     """
-    views = pool.map(lambda camera: _prepare(array, pictures[camera], gains[camera]), array.real)
+    views = run_all(lambda camera: _prepare(array, pictures[camera], gains[camera]), array.real)
     return dict(zip(array.real, views, strict=True))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,8 +13,7 @@ from mvcodec.frames import DisparityMap, Picture
 from mvcodec.stereo.consistency import MEDIAN_SIZE, median
 from mvcodec.stereo.fusion import fuse, row_texture
 from mvcodec.stereo.matcher import PairMatcher
-
-THREADS = 2
+from mvcodec.workers import run_all
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,14 +66,13 @@ class Pairwise:
         pairs = [
             pair for pair in camera_pairs(array) if self.vertical or not pair.vertical or array.cols == 1
         ]
-        with ThreadPoolExecutor(THREADS) as pool:
-            matched = pool.map(lambda pair: self._match(pair, array.cell_rho, pictures, range_px), pairs)
-            said: dict[Position, list[tuple[bool, DisparityMap]]] = {camera: [] for camera in array.real}
-            for pair, (first, second) in zip(pairs, matched, strict=True):
-                said[pair.first].append((pair.vertical, first))
-                said[pair.second].append((pair.vertical, second))
-            fused = pool.map(lambda camera: _fuse(pictures[camera], said[camera], range_px), said)
-            return dict(zip(said, fused, strict=True))
+        matched = run_all(lambda pair: self._match(pair, array.cell_rho, pictures, range_px), pairs)
+        said: dict[Position, list[tuple[bool, DisparityMap]]] = {camera: [] for camera in array.real}
+        for pair, (first, second) in zip(pairs, matched, strict=True):
+            said[pair.first].append((pair.vertical, first))
+            said[pair.second].append((pair.vertical, second))
+        fused = run_all(lambda camera: _fuse(pictures[camera], said[camera], range_px), said)
+        return dict(zip(said, fused, strict=True))
 
     def _match(
         self,

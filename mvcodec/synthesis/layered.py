@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 
@@ -21,10 +20,10 @@ from numpy.typing import NDArray
 from mvcodec.array import Position, Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, FloatMap, Picture, RenderedView
-from mvcodec.synthesis.bands import make_pool, run_in_bands
 from mvcodec.synthesis.camera_spread import measure_spread
 from mvcodec.synthesis.cell_cameras import CellCameras, find_cameras, real_view
 from mvcodec.synthesis.view_disparity import Ballot, view_disparity
+from mvcodec.workers import check_threads, run_all, run_in_bands, threads
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,12 +96,11 @@ class _Sources:
         self._ready: set[Position] = set()
         self._lock = threading.Lock()
 
-    def prepare(self, cameras: Sequence[Position], tolerance_px: float, pool: Executor) -> None:
+    def prepare(self, cameras: Sequence[Position], tolerance_px: float) -> None:
         """Make these cameras ready, side by side."""
         with self._lock:
             missing = [camera for camera in cameras if camera not in self._ready]
-            for _ in pool.map(partial(self._prepare, tolerance_px=tolerance_px), missing):
-                pass
+            run_all(partial(self._prepare, tolerance_px=tolerance_px), missing)
             self._ready.update(missing)
 
     def _prepare(self, camera: Position, tolerance_px: float) -> None:
@@ -130,9 +128,14 @@ def _contours(disparity: FloatMap, tolerance_px: float) -> NDArray[np.uint8]:
 
 
 class Layered:
-    """The `layered` synthesizer. Thread-safe; keeps what it prepared for the last decoded set."""
+    """The `layered` synthesizer. Thread-safe; keeps what it prepared for the last decoded set.
 
-    def __init__(self, settings: LayeredSettings | None = None) -> None:
+    Args:
+        settings: LayeredSettings() by default.
+        thread_count: how many threads make a view; by default as set for the process.
+    """
+
+    def __init__(self, settings: LayeredSettings | None = None, thread_count: int | None = None) -> None:
         self.settings = settings or LayeredSettings()
         self._ballot = Ballot(
             self.settings.tolerance_px,
@@ -141,7 +144,8 @@ class Layered:
             self.settings.denial,
             self.settings.reach_px,
         )
-        self._pool = make_pool("layered")
+        check_threads(thread_count)
+        self._threads = thread_count
         self._lock = threading.Lock()
         self._sources: _Sources | None = None
 
@@ -150,21 +154,22 @@ class Layered:
         own = real_view(decoded, viewpoint)
         if own is not None:
             return own
-        sources, cameras = self._prepared(decoded, viewpoint)
-        disparity = view_disparity(
-            sources.disparities,
-            sources.lumas,
-            cameras,
-            self._ballot,
-            decoded.disparity_range_px[0],
-            self._pool,
-        )
-        pixels, seen_by = self._colour(sources, cameras, disparity)
+        with threads(self._threads):
+            sources, cameras = self._prepared(decoded, viewpoint)
+            disparity = view_disparity(
+                sources.disparities,
+                sources.lumas,
+                cameras,
+                self._ballot,
+                decoded.disparity_range_px[0],
+            )
+            pixels, seen_by = self._colour(sources, cameras, disparity)
         return RenderedView(viewpoint, pixels, disparity, seen_by)
 
     def prepare(self, decoded: DecodedSet, viewpoint: Viewpoint) -> None:
         """See `Preparing.prepare`."""
-        self._prepared(decoded, viewpoint)
+        with threads(self._threads):
+            self._prepared(decoded, viewpoint)
 
     def _prepared(self, decoded: DecodedSet, viewpoint: Viewpoint) -> tuple[_Sources, CellCameras]:
         """The cameras that see a view, and the sources with these prepared."""
@@ -173,7 +178,7 @@ class Layered:
                 self._sources = _Sources(decoded, self.settings.spread)
             sources = self._sources
         cameras = find_cameras(decoded, viewpoint, sources.spread)
-        sources.prepare(cameras.cameras, self.settings.tolerance_px, self._pool)
+        sources.prepare(cameras.cameras, self.settings.tolerance_px)
         return sources, cameras
 
     def _colour(
@@ -185,7 +190,6 @@ class Layered:
         pixels: Picture = np.empty((*disparity.shape, 3), np.uint8)
         seen_by = np.empty(disparity.shape, np.uint8)
         run_in_bands(
-            self._pool,
             disparity.shape[0],
             view_colour.blend,
             cameras.places,

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from mvcodec.array import Position, Viewpoint
 from mvcodec.frames import DecodedSet, RenderedView
-from mvcodec.synthesis.bands import make_pool, run_in_bands
 from mvcodec.synthesis.camera_spread import FALLBACK
 from mvcodec.synthesis.cell_cameras import CellCameras, find_cameras, real_view
 from mvcodec.synthesis.view_disparity import Ballot, view_disparity
+from mvcodec.workers import check_threads, run_all, run_in_bands, threads
 
 TOLERANCE_PX = 1.5
 BALLOT = Ballot(tolerance_px=TOLERANCE_PX, ratio=1.3, contrast=0.0, denial=0.0, reach_px=0.54)
@@ -28,10 +28,15 @@ NO_LUMA = np.empty((0, 0, 0), np.float32)
 
 
 class Quick:
-    """The `quick` synthesizer. Thread-safe, one view at a time; keeps its room from one set to the next."""
+    """The `quick` synthesizer. Thread-safe, one view at a time; keeps its room from one set to the next.
 
-    def __init__(self) -> None:
-        self._pool = make_pool("quick")
+    Args:
+        thread_count: how many threads make a view; by default as set for the process.
+    """
+
+    def __init__(self, thread_count: int | None = None) -> None:
+        check_threads(thread_count)
+        self._threads = thread_count
         self._lock = threading.Lock()
         self._decoded: DecodedSet | None = None
         self._ready: set[Position] = set()
@@ -43,24 +48,23 @@ class Quick:
         own = real_view(decoded, viewpoint)
         if own is not None:
             return own
-        with self._lock:
+        with self._lock, threads(self._threads):
             cameras = self._prepared(decoded, viewpoint)
             return self._render(decoded, viewpoint, cameras)
 
     def prepare(self, decoded: DecodedSet, viewpoint: Viewpoint) -> None:
         """See `Preparing.prepare`."""
-        with self._lock:
+        with self._lock, threads(self._threads):
             self._prepared(decoded, viewpoint)
 
     def _render(self, decoded: DecodedSet, viewpoint: Viewpoint, cameras: CellCameras) -> RenderedView:
         from mvcodec.kernels import view_holes, view_quick
 
         background_px = decoded.disparity_range_px[0]
-        disparity = view_disparity(self._maps, NO_LUMA, cameras, BALLOT, background_px, self._pool)
+        disparity = view_disparity(self._maps, NO_LUMA, cameras, BALLOT, background_px)
         pixels = np.empty((*disparity.shape, 3), np.uint8)
         seen_by = np.empty(disparity.shape, np.uint8)
         run_in_bands(
-            self._pool,
             disparity.shape[0],
             view_quick.blend,
             cameras.places,
@@ -89,14 +93,13 @@ class Quick:
             for camera, place in zip(cameras.cameras, cameras.places, strict=True)
             if camera not in self._ready
         ]
-        jobs = [
-            self._pool.submit(pack, decoded.pictures[camera], self._packed[place])
-            for camera, place in missing
-        ]
-        for camera, place in missing:
+
+        def ready(camera: Position, place: int) -> None:
+            pack(decoded.pictures[camera], self._packed[place])
             self._maps[place] = decoded.disparities[camera].values_px
-        for job in jobs:
-            job.result()
+
+        if missing:
+            run_all(ready, *zip(*missing, strict=True))
         self._ready.update(camera for camera, _ in missing)
         return cameras
 

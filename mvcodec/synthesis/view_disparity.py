@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import cv2
@@ -10,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap
-from mvcodec.synthesis.bands import run_in_bands
 from mvcodec.synthesis.cell_cameras import CellCameras
+from mvcodec.workers import run_all, run_in_bands
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +30,6 @@ def view_disparity(
     seen: CellCameras,
     ballot: Ballot,
     background_px: float,
-    pool: Executor,
 ) -> FloatMap:
     """Disparity of every pixel of a view.
 
@@ -40,7 +38,6 @@ def view_disparity(
         lumas: float32 (R, H + 4, W + 4), see `mvcodec.kernels.view_fetch`; not looked at where nothing
             may be denied.
         background_px: disparity of rows of which no camera knows anything.
-        pool: threads to work in.
 
     Returns:
         float32 (H, W), px, known everywhere.
@@ -49,15 +46,13 @@ def view_disparity(
 
     _, height, width = maps.shape
     moved = np.empty((len(seen.places), height + 2, width + 2), np.float32)
-    jobs = [
-        pool.submit(view_depth.splat, maps[place], shift[0], shift[1], ballot.reach_px, out)
-        for place, shift, out in zip(seen.places, seen.shifts, moved, strict=True)
-    ]
-    for job in jobs:
-        job.result()
+
+    def move(place: int, shift: NDArray[np.float32], out: FloatMap) -> None:
+        view_depth.splat(maps[place], shift[0], shift[1], ballot.reach_px, out)
+
+    run_all(move, seen.places, seen.shifts, moved)
     voted = np.empty((height, width), np.float32)
     run_in_bands(
-        pool,
         height,
         view_depth.vote,
         moved,
@@ -73,6 +68,6 @@ def view_disparity(
         voted,
     )
     cleaned = np.asarray(cv2.medianBlur(voted, 3), np.float32)
-    run_in_bands(pool, height, view_depth.restore_thin, voted, ballot.tolerance_px, cleaned)
-    run_in_bands(pool, height, view_depth.fill_background, cleaned, background_px)
+    run_in_bands(height, view_depth.restore_thin, voted, ballot.tolerance_px, cleaned)
+    run_in_bands(height, view_depth.fill_background, cleaned, background_px)
     return cleaned
