@@ -28,7 +28,6 @@ from mvcodec.stereo.partners import neighbours, outside, partners, steps, unseen
 from mvcodec.stereo.subpixel import refine
 from mvcodec.workers import run_all
 
-THREADS = 2
 LEVELS_MULTIPLE = 8
 PENALTIES = (
     "small_step",
