@@ -20,9 +20,8 @@ def views(
     """uint8 (rows, cols, H, W, 3): one picture of grey tiles, 2 px farther from view to view."""
     height, width = size
     rng = np.random.default_rng(seed)
-    wide = (
-        rng.integers(0, 256, (height // 8 + 4, width // 8 + 4, 1)).astype(np.uint8).repeat(8, 0).repeat(8, 1)
-    )
+    tiles = rng.integers(0, 256, (height // 8 + 4, width // 8 + 4, 1)).astype(np.uint8)
+    wide = tiles.repeat(8, 0).repeat(8, 1).repeat(3, 2)
     return np.stack(
         [
             np.stack([wide[2 * row : 2 * row + height, 2 * col : 2 * col + width] for col in range(cols)])
