@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     )
     from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture, RenderedView
     from mvcodec.layers.refinement import make_matcher
+    from mvcodec.plugins import Plugin
     from mvcodec.settings import setting
     from mvcodec.stereo.matcher import Matcher, PairMatcher
     from mvcodec.stream import Packet, StreamHeader
@@ -59,6 +60,7 @@ _MODULES = {
     " OutputError SettingError StreamClosed StreamError",
     "mvcodec.frames": "DecodedSet DisparityMap FrameSet Picture RenderedView",
     "mvcodec.layers.refinement": "make_matcher",
+    "mvcodec.plugins": "Plugin",
     "mvcodec.settings": "setting",
     "mvcodec.stereo.matcher": "Matcher PairMatcher",
     "mvcodec.stream": "Packet StreamHeader",
@@ -91,6 +93,7 @@ __all__ = [
     "Packet",
     "PairMatcher",
     "Picture",
+    "Plugin",
     "Position",
     "RateControl",
     "RenderedView",

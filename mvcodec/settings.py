@@ -125,7 +125,7 @@ class Setting:
             return self.type(text)
         except (ValueError, KeyError) as error:
             if isinstance(error, SettingError):
-                raise
+                raise SettingError(name, error.found, error.expected) from None
             raise SettingError(name, text or "nothing", f"{self.allowed}{self._guess(text)}") from None
 
     def _guess(self, text: str) -> str:

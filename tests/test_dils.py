@@ -34,7 +34,7 @@ def random_pair(seed: int, height: int = 40, width: int = 60) -> tuple[View, Vie
 @pytest.mark.parametrize("seed", range(3))
 def test_is_the_equations_layer_by_layer(seed: int, beta: float) -> None:
     left, right = random_pair(seed)
-    view = Dils(DilsSettings(fill_holes=False)).synthesize_pair(left, right, beta, 1.0)
+    view = Dils(DilsSettings(fill=False)).synthesize_pair(left, right, beta, 1.0)
     layers = split(left.disparity)
     assert len(layers.bounds_px) > 0
     expected = pair_twins.dils_without_filling(left.pixels, right.pixels, layers, beta)
@@ -70,7 +70,7 @@ def test_layers_move_by_their_average() -> None:
 def test_holes_take_the_nearest_pixel_of_the_row_or_stay_black() -> None:
     left, right = random_pair(5)
     filled = Dils().synthesize_pair(left, right, 0.5, 1.0)
-    black = Dils(DilsSettings(fill_holes=False)).synthesize_pair(left, right, 0.5, 1.0)
+    black = Dils(DilsSettings(fill=False)).synthesize_pair(left, right, 0.5, 1.0)
     holes = ~black.disparity.valid
     assert filled.disparity.valid.all()
     assert 0 < holes.sum() < holes.size

@@ -45,7 +45,7 @@ def test_nearest_is_drawn_last_and_invalid_pixels_not_at_all() -> None:
 def test_holes_are_black_unless_filling_is_asked_for() -> None:
     left = row_view([10, 20, 30, 40], [0, 0, 0, 0], invalid=(1, 2))
     assert grey(Linear().synthesize_pair(left, left, 0.5, 1.0)) == [10, 0, 0, 40]
-    filled = Linear(LinearSettings(fill_holes=True)).synthesize_pair(left, left, 0.5, 1.0)
+    filled = Linear(LinearSettings(fill=True)).synthesize_pair(left, left, 0.5, 1.0)
     assert grey(filled) == [10, 10, 40, 40]
     assert filled.seen_by[0].tolist() == [2, 0, 0, 2]
 

@@ -146,8 +146,8 @@ def test_pictures_can_be_matched_again_at_every_level(route: Route, rho: float) 
                 Dils(DilsSettings("levels", route=route, rematch=matcher)),
             ),
             (
-                Linear(LinearSettings(fill_holes=True, route=route)),
-                Linear(LinearSettings(fill_holes=True, route=route, rematch=matcher)),
+                Linear(LinearSettings(fill=True, route=route)),
+                Linear(LinearSettings(fill=True, route=route, rematch=matcher)),
             ),
         ):
             wrong, right = (

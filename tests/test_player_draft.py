@@ -14,7 +14,7 @@ from mvcodec.player.messages import Measure, Message, Move, Play, Ready, Seek
 from mvcodec.player.session import MOVING_S, Session
 from mvcodec.synthesis.linear import Linear, LinearSettings
 
-SYNTHESIZER = Linear(LinearSettings(fill_holes=True))
+SYNTHESIZER = Linear(LinearSettings(fill=True))
 SCENE = PlaneScene(grid(3, 5, 96, 64, step=2), 8, (Plane(16, (20, 40, 50, 80)),))
 
 

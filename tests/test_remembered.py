@@ -17,6 +17,7 @@ from mvcodec.encoding.encoder import Encoder
 from mvcodec.errors import OutputError
 from mvcodec.evaluation.remembered import MapSpool, Remembered
 from mvcodec.frames import DisparityMap, Picture
+from mvcodec.plugins import Plugin
 from mvcodec.stereo.matchers import MATCHERS
 
 SECONDS = 0.05
@@ -119,7 +120,7 @@ def test_a_study_matches_once_and_counts_it_in_each_point(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     matcher = SlowMatcher()
-    monkeypatch.setitem(MATCHERS, "slow", lambda: matcher)
+    monkeypatch.setitem(MATCHERS, "slow", Plugin(lambda: matcher))
     points = study_run(tmp_path, RANGE_PX, "slow").measure()["mvcodec"]
     assert matcher.calls == 2, "once for each frame set"
     for point in points:

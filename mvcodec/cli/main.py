@@ -29,6 +29,7 @@ COMMANDS: dict[str, str] = {
     "recover": "write a clean file out of a damaged or unfinished one",
     "validate": "check a file against the rules of the format, access unit by access unit",
     "compare": "measure a decoded array against its original",
+    "plugins": "list matchers and synthesizers with their settings",
     "evaluate": "measure rate and distortion of an array against stock codecs",
 }
 """Name and purpose; each lives in mvcodec.cli.<name> as add_arguments(parser) and run(arguments)."""

@@ -13,7 +13,7 @@ from mvcodec.cli.arguments import add_matcher, add_synthesizer, check_matcher
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.errors import MissingExtra
-from mvcodec.synthesis.synthesizers import QUICKER, make_synthesizer
+from mvcodec.synthesis.synthesizers import make_synthesizer, quicker_synthesizer
 
 EXTRA = "play"
 PACKAGES = ("starlette", "uvicorn", "websockets")
@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> None:
     from mvcodec.player.warming import warm_up_beside
 
     make_synthesizer(arguments.synthesizer)  # a wrong name is told before anything is opened
-    quicker = QUICKER.get(arguments.synthesizer)
+    quicker = quicker_synthesizer(arguments.synthesizer)
     makers = [partial(make_synthesizer, name) for name in (arguments.synthesizer, quicker) if name]
     maker = PictureMaker(
         arguments.input,

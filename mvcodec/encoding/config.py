@@ -147,6 +147,19 @@ def _share(kbps: float, share: float, array: CameraArray) -> RateControl:
     return RateControl(bitrate_kbps=max(kbps * share / len(array.real), 1.0))
 
 
+def matcher_name(matcher: str | Matcher) -> str:
+    """What a header says of `EncoderConfig.matcher`: its shortest specification, or the name of its class.
+
+    Raises:
+        SettingError: there is none of that name.
+    """
+    if not isinstance(matcher, str):
+        return type(matcher).__name__
+    from mvcodec.layers.refinement import matcher_specification
+
+    return matcher_specification(matcher)
+
+
 def find_matcher(matcher: str | Matcher) -> Matcher:
     """What `EncoderConfig.matcher` stands for.
 

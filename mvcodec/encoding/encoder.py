@@ -12,7 +12,7 @@ import numpy as np
 import mvcodec
 from mvcodec.array import CameraArray, Position
 from mvcodec.depth import depth_mm
-from mvcodec.encoding.config import EncoderConfig, default_gop, find_matcher
+from mvcodec.encoding.config import EncoderConfig, default_gop, find_matcher, matcher_name
 from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stereo.matcher import Matcher
@@ -206,14 +206,13 @@ class Encoder:
 
     def _settings_record(self, maps: RateControl | None) -> dict[str, Any]:
         config, codec = self.config, self._codec
-        matcher = config.matcher if isinstance(config.matcher, str) else type(config.matcher).__name__
         record = {
             **asdict(config.rate),
             "disparity_qp": None if maps is None else maps.qp,
             "disparity_median": None if maps is None else self._median,
             "gop": self._gop,
             "preset": config.preset,
-            "matcher": matcher,
+            "matcher": matcher_name(config.matcher),
             "video": codec.settings(TrackKind.TEXTURE),
             "disparity": None if maps is None else codec.settings(TrackKind.DISPARITY),
             "encoder": f"mvcodec {mvcodec.__version__}",

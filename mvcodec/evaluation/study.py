@@ -23,7 +23,8 @@ from mvcodec.evaluation.fingerprint import (
 )
 from mvcodec.evaluation.points import BitsSplit, CurvePoint, PointStore
 from mvcodec.evaluation.remembered import MapSpool, Remembered
-from mvcodec.synthesis.synthesizers import make_synthesizer
+from mvcodec.layers.refinement import matcher_settings, matcher_specification
+from mvcodec.synthesis.synthesizers import SYNTHESIZER_PLUGINS, make_synthesizer
 from mvcodec.video.codec import RateControl
 from mvcodec.video.codecs import ANCHOR_CODECS, CODECS, find_codec
 from mvcodec.video.pyav import library_versions
@@ -186,7 +187,7 @@ class StudyRun:
             settings = {**asdict(replace(self.study.config, qp=qp)), "gop": self.gop}
             settings |= settings.pop("rate")
             del settings["threads"]  # which changes no bit
-            return {**settings, "synthesizer": self.study.synthesizer}
+            return {**settings, **self._plugins()}
         tour = curve.anchor.tours(self.source.array)[0]
         settings = find_codec(curve.codec).options(
             sequence_settings(
@@ -199,6 +200,18 @@ class StudyRun:
             )
         )
         return {"codec": curve.codec, "gop": self.gop, **settings}
+
+    def _plugins(self) -> dict[str, Any]:
+        """Matcher and synthesizer in full, so that a changed default makes another point."""
+        matcher = self.study.config.matcher
+        assert isinstance(matcher, str)
+        synthesizer = SYNTHESIZER_PLUGINS.choose(self.study.synthesizer)
+        return {
+            "matcher": matcher_specification(matcher),
+            "matcher_settings": matcher_settings(matcher),
+            "synthesizer": synthesizer.specification(),
+            "synthesizer_settings": synthesizer.all_settings(),
+        }
 
     def depends_on(self, curve: Curve, qp: int) -> dict[str, Any]:
         """All that a point depends on, as plain JSON values; automatic choices as they fall."""

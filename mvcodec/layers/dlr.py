@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.layers.dils_split import runs
 from mvcodec.layers.segments import Segments, split_picture
+from mvcodec.settings import check_settings, setting
 
 _MEDIAN_SIZE = 5
 _RIDGE = 0.1
@@ -30,30 +30,32 @@ _RIDGE = 0.1
 class DlrSettings:
     """Settings of DLR.
 
-    Attributes:
-        jump_px: neighbours that differ by more lie in different layers.
-        erosion_px: how far cores keep from the borders of their layer; a third of the matching window.
-        overlap_px: how far they keep from pixels that a nearer one hides from the partner.
-        slope_window: side of the window in which a core's slope is measured, px, odd.
-        least_share: disparities that fewer of a segment's pixels have end its layer.
+    Raises:
+        SettingError: a setting is outside its range.
     """
 
-    jump_px: float = 1.5
-    erosion_px: int = 7
-    overlap_px: int = 3
-    slope_window: int = 25
-    least_share: float = 0.03
+    jump_px: float = setting(1.5, "neighbours that differ by more lie in different layers, px", low=1e-3)
+    erosion_px: int = setting(
+        7,
+        "how far cores keep from the borders of their layer; a third of the matching window",
+        low=0,
+        high=100,
+    )
+    overlap_px: int = setting(
+        3, "how far they keep from pixels that a nearer one hides from the partner", low=0, high=100
+    )
+    slope_window: int = setting(
+        25,
+        "side of the window in which a core's slope is measured, px",
+        choices=range(3, 202, 2),
+        expected="an odd number 3..201",
+    )
+    least_share: float = setting(
+        0.03, "disparities that fewer of a segment's pixels have end its layer", low=0, high=0.999
+    )
 
     def __post_init__(self) -> None:
-        if not self.jump_px > 0:
-            raise SettingError("DlrSettings.jump_px", self.jump_px, "a positive number")
-        for name in ("erosion_px", "overlap_px"):
-            if not 0 <= getattr(self, name) <= 100:
-                raise SettingError(f"DlrSettings.{name}", getattr(self, name), "0..100")
-        if self.slope_window % 2 == 0 or not 3 <= self.slope_window <= 201:
-            raise SettingError("DlrSettings.slope_window", self.slope_window, "an odd number 3..201")
-        if not 0 <= self.least_share < 1:
-            raise SettingError("DlrSettings.least_share", self.least_share, "0 or more, below 1")
+        check_settings(self, "DlrSettings.")
 
 
 def refine(

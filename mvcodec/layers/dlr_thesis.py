@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, Mask, Picture
 from mvcodec.layers.dils_split import THRESHOLD, average_px
 from mvcodec.layers.segments import edge_map
 from mvcodec.layers.splits import LAYER_SPLITS
+from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.consistency import fill_from_farther
 
 
@@ -25,29 +25,27 @@ from mvcodec.stereo.consistency import fill_from_farther
 class ThesisDlrSettings:
     """Settings of the thesis's DLR.
 
-    Attributes:
-        split: how the map is split into layers, a name of LAYER_SPLITS; ``runs`` is the thesis's.
-        threshold: T of the split (equation 4.9), pixels, 0 or more.
-        erosion: side of the square of an erosion that specks do not survive, px, odd.
-        smoothing: side of the median that smooths a layer's mask, px, odd.
-
     Raises:
         SettingError: a setting is outside its range.
     """
 
-    split: str = "runs"
-    threshold: int = THRESHOLD
-    erosion: int = 3
-    smoothing: int = 5
+    split: str = setting("runs", "how a map is split into layers; runs: the thesis's", choices=LAYER_SPLITS)
+    threshold: int = setting(THRESHOLD, "T of the split (equation 4.9), pixels", low=0)
+    erosion: int = setting(
+        3,
+        "side of the square of an erosion that specks do not survive, px",
+        choices=range(1, 102, 2),
+        expected="an odd number 1..101",
+    )
+    smoothing: int = setting(
+        5,
+        "side of the median that smooths a layer's mask, px",
+        choices=range(1, 102, 2),
+        expected="an odd number 1..101",
+    )
 
     def __post_init__(self) -> None:
-        if self.split not in LAYER_SPLITS:
-            raise SettingError("ThesisDlrSettings.split", self.split, f"one of {', '.join(LAYER_SPLITS)}")
-        if self.threshold < 0:
-            raise SettingError("ThesisDlrSettings.threshold", self.threshold, "0 or more pixels")
-        for name in ("erosion", "smoothing"):
-            if getattr(self, name) % 2 == 0 or not 1 <= getattr(self, name) <= 101:
-                raise SettingError(f"ThesisDlrSettings.{name}", getattr(self, name), "an odd number 1..101")
+        check_settings(self, "ThesisDlrSettings.")
 
 
 def refine(

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from functools import partial
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.layers import dlr, dlr_thesis
+from mvcodec.plugins import Chosen, Plugin, PluginTable
 from mvcodec.stereo.matcher import Matcher
-from mvcodec.stereo.matchers import MATCHERS, make_base_matcher
+from mvcodec.stereo.matchers import MATCHER_PLUGINS, MATCHERS, make_base_matcher
 from mvcodec.stereo.pairwise import transposed
 
 _Pixel = TypeVar("_Pixel", bound=np.generic)
@@ -65,15 +67,31 @@ def _turned(plane: NDArray[_Pixel]) -> NDArray[_Pixel]:
     return np.ascontiguousarray(plane.T)
 
 
-def _by_the_thesis(picture: Picture, disparity: DisparityMap, *, partner_is_right: bool) -> DisparityMap:
-    del partner_is_right  # the thesis's steps look at one picture and its map alone
-    return dlr_thesis.refine(picture, disparity)
+def _dlr(settings: dlr.DlrSettings) -> Refinement:
+    return partial(dlr.refine, settings=settings)
 
 
-REFINEMENTS: dict[str, Refinement] = {"dlr": dlr.refine, "dlr-thesis": _by_the_thesis}
+def _thesis_dlr(settings: dlr_thesis.ThesisDlrSettings) -> Refinement:
+    def refine(picture: Picture, disparity: DisparityMap, *, partner_is_right: bool) -> DisparityMap:
+        del partner_is_right  # the thesis's steps look at one picture and its map alone
+        return dlr_thesis.refine(picture, disparity, settings=settings)
+
+    return refine
+
+
+REFINEMENTS: dict[str, Plugin] = {
+    "dlr": Plugin(_dlr, dlr.DlrSettings, "depth layer refinement of our own, for maps of fixed windows"),
+    "dlr-thesis": Plugin(
+        _thesis_dlr, dlr_thesis.ThesisDlrSettings, "depth layer refinement as chapter 5 of the thesis has it"
+    ),
+}
+
+REFINEMENT_PLUGINS = PluginTable("refinement", REFINEMENTS)
 
 SEPARATOR = "+"
-"""Between the name of a matcher and that of the refinement that follows it: ``sad+dlr``."""
+"""Between a matcher and the refinement that follows it: ``sad+dlr``."""
+
+_PARTS = re.compile(r"\+(?=[A-Za-z])")  # not the sign of an exponent
 
 
 def matcher_choices() -> str:
@@ -82,14 +100,39 @@ def matcher_choices() -> str:
     return f"one of {', '.join(MATCHERS)}, with {refinements} behind it if wanted"
 
 
-def make_matcher(name: str) -> Matcher:
-    """The matcher of this name, one of MATCHERS, refined where that of a refinement follows: ``sad+dlr``.
+def make_matcher(specification: str) -> Matcher:
+    """The matcher of this name and settings, refined where a refinement follows.
+
+    Args:
+        specification: ``joint``, ``sad:window=9``, ``sad:window=9+dlr`` ...
 
     Raises:
-        SettingError: there is none; the message names the choices.
+        SettingError: there is none, or a setting is unknown or outside its range; names the choices.
+        InputError: another package's matcher does not load; names the package.
     """
-    base, separator, refinement = name.partition(SEPARATOR)
-    if base not in MATCHERS or (separator and refinement not in REFINEMENTS):
-        raise SettingError("matcher", name, matcher_choices())
+    base, refinement = _parts(specification)
     matcher = make_base_matcher(base)
-    return Refined(matcher, REFINEMENTS[refinement]) if separator else matcher
+    return Refined(matcher, _refinement(refinement).make()) if refinement else matcher
+
+
+def matcher_specification(specification: str) -> str:
+    """The shortest one that says the same: without settings that have their defaults. Raises as above."""
+    base, refinement = _parts(specification)
+    words = [MATCHER_PLUGINS.choose(base)] + ([_refinement(refinement)] if refinement else [])
+    return SEPARATOR.join(word.specification() for word in words)
+
+
+def matcher_settings(specification: str) -> dict[str, dict[str, Any]]:
+    """Every setting of a matcher and its refinement, by name, as plain JSON. Raises as above."""
+    base, refinement = _parts(specification)
+    words = [MATCHER_PLUGINS.choose(base)] + ([_refinement(refinement)] if refinement else [])
+    return {word.name: word.all_settings() for word in words}
+
+
+def _parts(specification: str) -> tuple[str, str]:
+    base, *refinements = _PARTS.split(specification, maxsplit=1)
+    return base, "".join(refinements)
+
+
+def _refinement(specification: str) -> Chosen:
+    return REFINEMENT_PLUGINS.choose(specification, "matcher refinement")

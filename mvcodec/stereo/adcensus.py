@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
+from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.consistency import median
 from mvcodec.workers import run_in_bands
 
@@ -44,49 +45,32 @@ _Arms = NDArray[np.int16]
 class AdCensusSettings:
     """Settings of `AdCensus`; the defaults are the paper's, but for the tolerance (0 there).
 
-    Attributes:
-        lambda_difference, lambda_census: what the two costs are truncated by.
-        reach, near_reach: L1 and L2 of the crosses, px.
-        colour, far_colour: tau1 and tau2 of the crosses, grey levels.
-        rounds: of aggregation, rows first and columns first in turn.
-        step_penalty, jump_penalty: pi1 and pi2 of the scanlines.
-        edge_colour: tau_SO of the scanlines, grey levels.
-        least_votes, least_share: tau_S and tau_H of region voting.
-        tolerance_px: of the left-right check.
+    Raises:
+        SettingError: a setting is outside its range.
     """
 
-    lambda_difference: float = 10.0
-    lambda_census: float = 30.0
-    reach: int = 34
-    near_reach: int = 17
-    colour: int = 20
-    far_colour: int = 6
-    rounds: int = 4
-    step_penalty: float = 1.0
-    jump_penalty: float = 3.0
-    edge_colour: int = 15
-    least_votes: int = 20
-    least_share: float = 0.4
-    tolerance_px: int = 1
+    lambda_difference: float = setting(10.0, "what the cost of colour is truncated by", low=1e-3)
+    lambda_census: float = setting(30.0, "what the cost of census is truncated by", low=1e-3)
+    reach: int = setting(34, "L1 of the crosses, px", low=1, high=1000)
+    near_reach: int = setting(17, "L2 of the crosses, px, at most reach", low=1, high=1000)
+    colour: int = setting(20, "tau1 of the crosses, grey levels", low=0, high=256)
+    far_colour: int = setting(6, "tau2 of the crosses, grey levels", low=0, high=256)
+    rounds: int = setting(4, "of aggregation, rows first and columns first in turn", low=0)
+    step_penalty: float = setting(1.0, "pi1 of the scanlines, at most jump_penalty", low=0)
+    jump_penalty: float = setting(3.0, "pi2 of the scanlines", low=0)
+    edge_colour: int = setting(15, "tau_SO of the scanlines, grey levels", low=0, high=256)
+    least_votes: int = setting(20, "tau_S of region voting", low=0)
+    least_share: float = setting(0.4, "tau_H of region voting", low=0, high=1)
+    tolerance_px: int = setting(1, "of the left-right check, px", low=0)
 
     def __post_init__(self) -> None:
-        for name in ("lambda_difference", "lambda_census"):
-            if not getattr(self, name) > 0:
-                raise SettingError(f"adcensus.{name}", getattr(self, name), "a positive number")
-        for name in ("colour", "far_colour", "edge_colour"):
-            if not 0 <= getattr(self, name) <= 256:
-                raise SettingError(f"adcensus.{name}", getattr(self, name), "0..256")
-        for name in ("rounds", "least_votes", "tolerance_px"):
-            if getattr(self, name) < 0:
-                raise SettingError(f"adcensus.{name}", getattr(self, name), "0 or more")
-        if not 1 <= self.near_reach <= self.reach <= 1000:
+        check_settings(self, "adcensus.")
+        if not self.near_reach <= self.reach:
             found = f"{self.near_reach}, {self.reach}"
             raise SettingError("adcensus.near_reach, reach", found, "1 <= near_reach <= reach <= 1000")
-        if not 0 <= self.step_penalty <= self.jump_penalty < math.inf:
+        if not self.step_penalty <= self.jump_penalty:
             found = f"{self.step_penalty}, {self.jump_penalty}"
             raise SettingError("adcensus.step_penalty, jump_penalty", found, "0 <= step <= jump")
-        if not 0 <= self.least_share <= 1:
-            raise SettingError("adcensus.least_share", self.least_share, "0..1")
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
+from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.consistency import cross_check
 
 _CENSUS_RADIUS = 2
@@ -101,27 +102,28 @@ class FixedWindowSettings:
 
     Attributes:
         measure: a name of MEASURES.
-        window: side of the square window, px, odd.
-        tolerance_px: of the left-right check.
-        median_size: side of the final median, odd, or 0 for none.
-        subpixel: whether a parabola refines the winner (the thesis has whole pixels).
+
+    Raises:
+        SettingError: a setting is outside its range.
     """
 
     measure: str = "sad"
-    window: int = 21
-    tolerance_px: float = 1.0
-    median_size: int = 11
-    subpixel: bool = False
+    window: int = setting(
+        21, "side of the square window, px", choices=range(1, 102, 2), expected="an odd number 1..101"
+    )
+    tolerance_px: float = setting(1.0, "of the left-right check, px", low=0)
+    median_size: int = setting(
+        11,
+        "side of the final median, px; 0: none",
+        choices=(0, *range(1, 102, 2)),
+        expected="0 or an odd number 1..101",
+    )
+    subpixel: bool = setting(False, "a parabola refines the winner (the thesis has whole pixels)")
 
     def __post_init__(self) -> None:
         if self.measure not in MEASURES:
             raise SettingError("fixed window.measure", self.measure, "one of " + ", ".join(MEASURES))
-        if self.window % 2 == 0 or not 1 <= self.window <= 101:
-            raise SettingError(f"{self.measure}.window", self.window, "an odd number 1..101")
-        if self.median_size and (self.median_size % 2 == 0 or not 1 <= self.median_size <= 101):
-            raise SettingError(f"{self.measure}.median_size", self.median_size, "0 or an odd number 1..101")
-        if not self.tolerance_px >= 0:
-            raise SettingError(f"{self.measure}.tolerance_px", self.tolerance_px, "0 or more")
+        check_settings(self, f"{self.measure}.")
 
 
 @dataclass(frozen=True, slots=True)

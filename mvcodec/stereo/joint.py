@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
+from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.consistency import drop_speckles, median
 from mvcodec.stereo.exposure import camera_gains
 from mvcodec.stereo.matching_view import MatchingView, prepare_views
@@ -29,89 +29,60 @@ from mvcodec.stereo.subpixel import refine
 from mvcodec.workers import run_all
 
 LEVELS_MULTIPLE = 8
-PENALTIES = (
-    "small_step",
-    "jump",
-    "least_jump",
-    "completion_small_step",
-    "completion_jump",
-    "completion_least_jump",
-)
 
 
 @dataclass(frozen=True, slots=True)
 class JointSettings:
     """Settings of the joint matcher. Costs are in units of 8-bit grey levels.
 
-    Attributes:
-        colour_limit: most that the colour difference (sum of three channels) counts, 0..120.
-        bit_cost, bit_limit: cost of each bit of census distance, and the most it counts, 0..130.
-        lone_cost: added where one partner alone must see the pixel, 0..100.
-        outside_cost: of a disparity that leaves every partner's picture, 0..254.
-        small_step, jump, least_jump: penalties P1 and P2 of semi-global matching, and what is left of
-            P2 at an edge of the picture, 0..600; `completion_`: the same when the rest is completed.
-        contrast: grey levels that halve P2, above 0.
-        hold_per_px, hold_limit: how firmly confirmed pixels hold when the rest is completed.
-        through_cost: of a disparity that another camera sees through, 0..254.
-        edge_cost, row_cost: where no partner can see, px of detour along a row that a grey level of contrast
-            is worth, at least 0, and a step to the next row, at least 1: what stands in the world
-            lies on floors and tables, whose disparity is the same along rows.
-        tolerance_px: maps agree within this, px, above 0.
-        border_speckle_px: smallest patch that counts where no partner sees the whole range, pixels.
-        median_size: window of the median after completion, 0 (none), 3 or 5.
-        thin_px, thin_area_px: the median leaves confirmed surfaces of at least this many pixels alone that
-            are nearer than all that it leaves around them, by more than this.
-        subpixel_steps: steps of sub-pixel refinement, see `mvcodec.stereo.subpixel`.
-
     Raises:
         SettingError: a setting is outside its range.
     """
 
-    colour_limit: float = 60
-    bit_cost: float = 4
-    bit_limit: float = 82
-    lone_cost: int = 12
-    outside_cost: int = 100
-    small_step: float = 35
-    jump: float = 170
-    least_jump: float = 50
-    contrast: float = 8
-    completion_small_step: float = 20
-    completion_jump: float = 80
-    completion_least_jump: float = 7
-    hold_per_px: float = 7
-    hold_limit: float = 40
-    through_cost: float = 40
-    edge_cost: float = 3
-    row_cost: float = 50
-    tolerance_px: float = 1.0
-    border_speckle_px: int = 50
-    median_size: int = 5
-    thin_px: float = 3
-    thin_area_px: int = 16
-    subpixel_steps: int = 3
+    colour_limit: float = setting(
+        60, "most that the colour difference (sum of three channels) counts", low=0, high=120
+    )
+    bit_cost: float = setting(4, "cost of each bit of census distance", low=0, high=1e6)
+    bit_limit: float = setting(82, "most that the census distance counts", low=0, high=130)
+    lone_cost: int = setting(12, "added where one partner alone must see the pixel", low=0, high=100)
+    outside_cost: int = setting(100, "of a disparity that leaves every partner's picture", low=0, high=254)
+    small_step: float = setting(35, "penalty P1 of semi-global matching", low=0, high=600)
+    jump: float = setting(170, "penalty P2 of semi-global matching", low=0, high=600)
+    least_jump: float = setting(50, "what is left of P2 at an edge of the picture", low=0, high=600)
+    contrast: float = setting(8, "grey levels that halve P2", low=1e-3, high=255)
+    completion_small_step: float = setting(20, "P1 when the rest is completed", low=0, high=600)
+    completion_jump: float = setting(80, "P2 when the rest is completed", low=0, high=600)
+    completion_least_jump: float = setting(7, "what is left of it at an edge", low=0, high=600)
+    hold_per_px: float = setting(
+        7, "how firmly confirmed pixels hold when the rest is completed, for each px", low=0, high=1e6
+    )
+    hold_limit: float = setting(40, "the most that counts of it", low=0, high=254)
+    through_cost: float = setting(40, "of a disparity that another camera sees through", low=0, high=254)
+    # What stands in the world lies on floors and tables, whose disparity is the same along rows.
+    edge_cost: float = setting(
+        3,
+        "where no partner can see: px of detour along a row that a grey level of contrast is worth",
+        low=0,
+        high=1e6,
+    )
+    row_cost: float = setting(50, "the same that a step to the next row is worth", low=1, high=1e6)
+    tolerance_px: float = setting(1.0, "maps agree within this, px", low=1e-3, high=255)
+    border_speckle_px: int = setting(
+        50, "smallest patch that counts where no partner sees the whole range, pixels", low=0, high=1e6
+    )
+    median_size: int = setting(5, "window of the median after completion, px; 0: none", choices=(0, 3, 5))
+    thin_px: float = setting(
+        3,
+        "the median leaves confirmed surfaces alone that are nearer by more than this than all that it leaves"
+        " around them, px",
+        low=0,
+        high=1e6,
+    )
+    thin_area_px: int = setting(16, "and that have at least this many pixels", low=0, high=1e6)
+    subpixel_steps: int = setting(3, "steps of sub-pixel refinement", low=0, high=20)
 
     def __post_init__(self) -> None:
-        limits = {
-            "colour_limit": (0, 120),
-            "bit_limit": (0, 130),
-            "lone_cost": (0, 100),
-            "outside_cost": (0, 254),
-            "through_cost": (0, 254),
-            "hold_limit": (0, 254),
-            "contrast": (1e-3, 255),
-            **dict.fromkeys(PENALTIES, (0, 600)),
-            "row_cost": (1, 1e6),
-            "tolerance_px": (1e-3, 255),
-            "subpixel_steps": (0, 20),
-        }
-        for name in self.__slots__:
-            low, high = limits.get(name, (0, 1e6))
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise SettingError(f"JointSettings.{name}", value, f"{low:g}..{high:g}")
-        if self.median_size not in {0, 3, 5}:
-            raise SettingError("JointSettings.median_size", self.median_size, "0, 3 or 5")
+        check_settings(self, "JointSettings.")
 
 
 class Joint:

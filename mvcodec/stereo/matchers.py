@@ -2,35 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import cast
 
 from mvcodec.errors import SettingError
-from mvcodec.stereo.adcensus import AdCensus
+from mvcodec.plugins import Plugin, PluginTable
+from mvcodec.stereo.adcensus import AdCensus, AdCensusSettings
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
-from mvcodec.stereo.joint import Joint
-from mvcodec.stereo.matcher import Matcher
+from mvcodec.stereo.joint import Joint, JointSettings
+from mvcodec.stereo.matcher import Matcher, PairMatcher
 from mvcodec.stereo.pairwise import Pairwise
-from mvcodec.stereo.sgbm import Sgbm
+from mvcodec.stereo.sgbm import Sgbm, SgbmSettings
 
-MATCHERS: dict[str, Callable[[], Matcher]] = {
-    "joint": Joint,
-    "sgbm": lambda: Pairwise(Sgbm()),
+
+def _fixed_window(measure: str, title: str, window: int = 9) -> Plugin:
+    defaults = {"measure": measure, "window": window, "subpixel": True}
+    text = f"fixed windows by {title}, winner takes all, to parts of a pixel"
+    return Plugin(lambda made: Pairwise(FixedWindow(made)), FixedWindowSettings, text, defaults)
+
+
+MATCHERS: dict[str, Plugin] = {
+    "joint": Plugin(Joint, JointSettings, "each camera against all its neighbours at once; the default"),
+    "sgbm": Plugin(
+        lambda made: Pairwise(Sgbm(made)), SgbmSettings, "semi-global matching of pairs, by OpenCV"
+    ),
     # Plain maps to judge renderers by: one partner.
-    "sgbm-h": lambda: Pairwise(Sgbm(), vertical=False),
-    "sad": lambda: Pairwise(FixedWindow(FixedWindowSettings("sad", subpixel=True))),
-    "ssd": lambda: Pairwise(FixedWindow(FixedWindowSettings("ssd", window=9, subpixel=True))),
-    "ncc": lambda: Pairwise(FixedWindow(FixedWindowSettings("ncc", window=9, subpixel=True))),
-    "census": lambda: Pairwise(FixedWindow(FixedWindowSettings("census", window=9, subpixel=True))),
-    "adcensus": lambda: Pairwise(AdCensus()),
+    "sgbm-h": Plugin(
+        lambda made: Pairwise(Sgbm(made), vertical=False), SgbmSettings, "the same along rows alone"
+    ),
+    "sad": _fixed_window("sad", "absolute differences", 21),
+    "ssd": _fixed_window("ssd", "squared differences"),
+    "ncc": _fixed_window("ncc", "normalised cross correlation"),
+    "census": _fixed_window("census", "Hamming distances of census transforms"),
+    "adcensus": Plugin(
+        lambda made: Pairwise(AdCensus(made)), AdCensusSettings, "AD-Census (Mei et al. 2011) of pairs"
+    ),
 }
 
+MATCHER_PLUGINS = PluginTable("matcher", MATCHERS, "mvcodec.matchers")
 
-def make_base_matcher(name: str) -> Matcher:
-    """The matcher of that name, without a refinement.
+
+def make_base_matcher(specification: str) -> Matcher:
+    """The matcher of that name and settings, without a refinement.
 
     Raises:
-        SettingError: there is none.
+        SettingError: there is none, or a setting is unknown or outside its range.
+        InputError: another package's matcher does not load.
     """
-    if name not in MATCHERS:
-        raise SettingError("matcher", name, "one of " + ", ".join(MATCHERS))
-    return MATCHERS[name]()
+    made = MATCHER_PLUGINS.choose(specification).make()
+    return cast("Matcher", made) if hasattr(made, "match") else Pairwise(made)
+
+
+def make_pair_matcher(specification: str) -> PairMatcher:
+    """The same for a pair of pictures.
+
+    Raises:
+        SettingError: as above, or it is one of whole arrays.
+        InputError: as above.
+    """
+    matcher = make_base_matcher(specification)
+    if not isinstance(matcher, Pairwise):
+        raise SettingError("matcher", specification, "one of pairs, such as sgbm, sad or adcensus")
+    return matcher.pair_matcher

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
+from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.consistency import cross_check
 
 MAX_DISPARITY_PX = 2000
@@ -25,38 +26,31 @@ _LEVELS_MULTIPLE = 16
 class SgbmSettings:
     """Settings of `Sgbm`.
 
-    Attributes:
-        block_size: matching window, odd.
-        p1, p2: penalties of a disparity step of one and of more, for each pixel of the block
-            and each channel; less than half of what OpenCV's manual advises,
-            so that thin objects are in the maps.
-        prefilter_cap: the x-derivative is truncated to +- this.
-        uniqueness_percent: a match counts when every other one costs this much more.
-        tolerance_px: of the left-right check.
-        speckle_area_px: smaller consistent patches are dropped.
-        median_size: final median, 0 (none), 3 or 5.
+    The penalties are less than half of what OpenCV's manual advises, so that thin objects are in the maps.
+
+    Raises:
+        SettingError: a setting is outside its range.
     """
 
-    block_size: int = 3
-    p1: int = 3
-    p2: int = 12
-    prefilter_cap: int = 15
-    uniqueness_percent: int = 0
-    tolerance_px: float = 1.0
-    speckle_area_px: int = 60
-    median_size: int = 5
+    block_size: int = setting(
+        3, "side of the matching window, px", choices=range(1, 12, 2), expected="an odd number 1..11"
+    )
+    p1: int = setting(
+        3, "penalty of a disparity step of one, for each pixel of the block and each channel", low=1, high=128
+    )
+    p2: int = setting(12, "the same of a larger step, above p1", low=1, high=128)
+    prefilter_cap: int = setting(15, "the x-derivative is truncated to +- this", low=1, high=63)
+    uniqueness_percent: int = setting(
+        0, "a match counts when every other one costs this much more", low=0, high=99
+    )
+    tolerance_px: float = setting(1.0, "of the left-right check, px", low=0)
+    speckle_area_px: int = setting(60, "smaller consistent patches are dropped, pixels", low=0)
+    median_size: int = setting(5, "window of the final median, px; 0: none", choices=(0, 3, 5))
 
     def __post_init__(self) -> None:
-        if self.block_size % 2 == 0 or not 1 <= self.block_size <= 11:
-            raise SettingError("sgbm.block_size", self.block_size, "an odd number 1..11")
-        if not 0 < self.p1 < self.p2 <= 128:
+        check_settings(self, "sgbm.")
+        if not self.p1 < self.p2:
             raise SettingError("sgbm.p1, sgbm.p2", f"{self.p1}, {self.p2}", "0 < p1 < p2 <= 128")
-        if not 1 <= self.prefilter_cap <= 63:
-            raise SettingError("sgbm.prefilter_cap", self.prefilter_cap, "1..63")
-        if not 0 <= self.uniqueness_percent < 100:
-            raise SettingError("sgbm.uniqueness_percent", self.uniqueness_percent, "0..99")
-        if self.median_size not in (0, 3, 5):
-            raise SettingError("sgbm.median_size", self.median_size, "0, 3 or 5")
 
 
 @dataclass(frozen=True, slots=True)

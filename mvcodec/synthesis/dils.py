@@ -14,48 +14,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.array import Viewpoint
-from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, LayerStack, RenderedView
 from mvcodec.layers.dils_split import THRESHOLD, average_px
 from mvcodec.layers.splits import LAYER_SPLITS
+from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.matcher import PairMatcher
+from mvcodec.stereo.matchers import make_pair_matcher
 from mvcodec.synthesis import mlvs
-from mvcodec.synthesis.mlvs import Route, View
-from mvcodec.synthesis.rematch import Rematched
+from mvcodec.synthesis.mlvs import ROUTE_HELP, Route, View
+from mvcodec.synthesis.rematch import REMATCH_HELP, Rematched
 from mvcodec.synthesis.rows import forward_pair
 
 
 @dataclass(frozen=True, slots=True)
 class DilsSettings:
-    """Settings of DILS; the defaults are the thesis's.
-
-    Attributes:
-        split: how the map is split into layers, a name of LAYER_SPLITS.
-        threshold: T of the split (equation 4.9), pixels, 0 or more.
-        alpha: share of the left picture in the blend (4.17), 0..1.
-        fill_holes: False leaves holes black.
-        route: how level 3 of MLVS reaches the middle of a cell.
-        rematch: matches the pictures of every pair anew, as the thesis does; by default the decoded maps
-            are used and carried along.
+    """Settings of DILS; the defaults are the thesis's, but that the decoded maps are carried along.
 
     Raises:
         SettingError: a setting is outside its range.
     """
 
-    split: str = "runs"
-    threshold: int = THRESHOLD
-    alpha: float = 0.5
-    fill_holes: bool = True
-    route: Route = Route.UPPER_LOWER
-    rematch: PairMatcher | None = None
+    split: str = setting("runs", "how a map is split into layers; runs: the thesis's", choices=LAYER_SPLITS)
+    threshold: int = setting(THRESHOLD, "T of the split (equation 4.9), pixels", low=0)
+    alpha: float = setting(0.5, "share of the left picture in the blend (4.17)", low=0, high=1)
+    fill: bool = setting(True, "fill holes along the row; no: leave them black")
+    route: Route = setting(Route.UPPER_LOWER, ROUTE_HELP)
+    rematch: PairMatcher | None = setting(None, REMATCH_HELP, parse=make_pair_matcher)
 
     def __post_init__(self) -> None:
-        if self.split not in LAYER_SPLITS:
-            raise SettingError("DilsSettings.split", self.split, f"one of {', '.join(LAYER_SPLITS)}")
-        if self.threshold < 0:
-            raise SettingError("DilsSettings.threshold", self.threshold, "0 or more pixels")
-        if not 0 <= self.alpha <= 1:
-            raise SettingError("DilsSettings.alpha", self.alpha, "0..1")
+        check_settings(self, "DilsSettings.")
 
 
 class Dils:
@@ -81,7 +68,7 @@ class Dils:
             nearness=layers.labels.astype(np.float32),
             usable=layers.labels > 0,
             left_weight=self.settings.alpha,
-            fill_holes=self.settings.fill_holes,
+            fill_holes=self.settings.fill,
         )
 
 

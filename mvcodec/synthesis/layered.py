@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.array import Position, Viewpoint
-from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, FloatMap, Picture, RenderedView
+from mvcodec.settings import check_settings, setting
 from mvcodec.synthesis.camera_spread import measure_spread
 from mvcodec.synthesis.cell_cameras import CellCameras, find_cameras, real_view
 from mvcodec.synthesis.view_disparity import Ballot, view_disparity
@@ -30,50 +30,41 @@ from mvcodec.workers import check_threads, run_all, run_in_bands, threads
 class LayeredSettings:
     """Settings of the layered synthesizer.
 
-    Attributes:
-        tolerance_px: disparities this close are one surface, px, above 0.
-        ratio: cameras behind a farther surface must weigh this many times those of a nearer one to
-            outvote it, at least 1.
-        contrast: grey levels; a camera that sees something farther denies a nearer surface when its
-            picture differs by more than this, 0..255.
-        denial: how much such a camera counts against that surface, as a share of its weight, 0..10.
-        reach_px: how far a moved pixel covers its surroundings, px, 0.5..1.
-        spread: squared cells; a camera at distance b counts 1 / (spread + b^2), so that more cameras are
-            averaged (less noise, more blur) with a larger one, above 0. None: as the pictures ask for,
-            see `mvcodec.synthesis.camera_spread`.
-        edge_trust: weight of pixels fetched at a camera's contours, above 0 and at most 1.
-        sharpness: Keys' parameter a of the cubic fetch, -1..0.
-        hole_reach_px: how far holes are painted from, px, at least 1.
-
     Raises:
         SettingError: a setting is outside its range.
     """
 
-    tolerance_px: float = 1.5
-    ratio: float = 1.3
-    contrast: float = 10.0
-    denial: float = 0.6
-    reach_px: float = 0.54
-    spread: float | None = None
-    edge_trust: float = 0.5
-    sharpness: float = -0.7
-    hole_reach_px: int = 64
+    tolerance_px: float = setting(1.5, "disparities this close are one surface, px", low=1e-3, high=1e3)
+    ratio: float = setting(
+        1.3,
+        "cameras behind a farther surface must weigh this many times those of a nearer one to outvote it",
+        low=1,
+        high=1e3,
+    )
+    contrast: float = setting(
+        10.0,
+        "a camera that sees something farther denies a nearer surface when its picture differs by more than"
+        " this, grey levels",
+        low=0,
+        high=255,
+    )
+    denial: float = setting(
+        0.6, "how much such a camera counts against that surface, as a share of its weight", low=0, high=10
+    )
+    reach_px: float = setting(0.54, "how far a moved pixel covers its surroundings, px", low=0.5, high=1)
+    spread: float | None = setting(
+        None,
+        "a camera at distance b (cells) counts 1 / (spread + b^2): larger averages more cameras; none: as the"
+        " pictures ask for",
+        low=1e-3,
+        high=1e3,
+    )
+    edge_trust: float = setting(0.5, "weight of pixels fetched at a camera's contours", low=1e-3, high=1)
+    sharpness: float = setting(-0.7, "Keys' parameter a of the cubic fetch", low=-1, high=0)
+    hole_reach_px: int = setting(64, "how far holes are painted from, px", low=1, high=4096)
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("tolerance_px", 1e-3, 1e3),
-            ("ratio", 1.0, 1e3),
-            ("contrast", 0.0, 255.0),
-            ("denial", 0.0, 10.0),
-            ("reach_px", 0.5, 1.0),
-            ("spread", 1e-3, 1e3),
-            ("edge_trust", 1e-3, 1.0),
-            ("sharpness", -1.0, 0.0),
-            ("hole_reach_px", 1, 4096),
-        ):
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise SettingError(f"LayeredSettings.{name}", value, f"{low}..{high}")
+        check_settings(self, "LayeredSettings.")
 
 
 class _Sources:

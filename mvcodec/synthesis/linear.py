@@ -13,27 +13,29 @@ from numpy.typing import NDArray
 
 from mvcodec.array import MAX_PICTURE_SIDE, Viewpoint
 from mvcodec.frames import DecodedSet, FloatMap, RenderedView
+from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.matcher import PairMatcher
+from mvcodec.stereo.matchers import make_pair_matcher
 from mvcodec.synthesis import mlvs
-from mvcodec.synthesis.mlvs import Route, View
-from mvcodec.synthesis.rematch import Rematched
+from mvcodec.synthesis.mlvs import ROUTE_HELP, Route, View
+from mvcodec.synthesis.rematch import REMATCH_HELP, Rematched
 from mvcodec.synthesis.rows import forward_pair
 
 
 @dataclass(frozen=True, slots=True)
 class LinearSettings:
-    """Settings of linear interpolation; the defaults are the thesis's.
+    """Settings of linear interpolation; the defaults are the thesis's, but that the decoded maps are used.
 
-    Attributes:
-        fill_holes: True fills holes along the row, as DILS does.
-        route: how level 3 of MLVS reaches the middle of a cell.
-        rematch: matches the pictures of every pair anew, as the thesis does; by default the decoded maps
-            are used and carried along.
+    Raises:
+        SettingError: a setting is outside its range.
     """
 
-    fill_holes: bool = False
-    route: Route = Route.UPPER_LOWER
-    rematch: PairMatcher | None = None
+    fill: bool = setting(False, "fill holes along the row, as DILS does; no: leave them black")
+    route: Route = setting(Route.UPPER_LOWER, ROUTE_HELP)
+    rematch: PairMatcher | None = setting(None, REMATCH_HELP, parse=make_pair_matcher)
+
+    def __post_init__(self) -> None:
+        check_settings(self, "LinearSettings.")
 
 
 class Linear:
@@ -59,7 +61,7 @@ class Linear:
             nearness=disparity.values_px,
             usable=disparity.valid,
             left_weight=1 - beta,
-            fill_holes=self.settings.fill_holes,
+            fill_holes=self.settings.fill,
         )
 
 

@@ -29,6 +29,9 @@ class Route(StrEnum):
     """From level 2's pictures, synthesised as left-right pairs."""
 
 
+ROUTE_HELP = "to the middle of a cell: ul from two pictures of its rows, lr from two of its columns"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
     """A picture with its map, a real camera's or a synthesised one.

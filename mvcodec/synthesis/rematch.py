@@ -10,6 +10,10 @@ from mvcodec.frames import DisparityMap
 from mvcodec.stereo.matcher import PairMatcher
 from mvcodec.synthesis.mlvs import PairSynthesizer, View
 
+REMATCH_HELP = (
+    "matches the pictures of every pair anew, as the thesis does; none: decoded maps are carried along"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Rematched:

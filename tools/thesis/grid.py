@@ -60,7 +60,7 @@ class Method:
         rematch = matcher if self.matched_again else None
         if self.split == "linear":
             return Linear(LinearSettings(self.filled, route, rematch))
-        return Dils(DilsSettings(self.split, fill_holes=self.filled, route=route, rematch=rematch))
+        return Dils(DilsSettings(self.split, fill=self.filled, route=route, rematch=rematch))
 
 
 METHODS = (

@@ -45,7 +45,7 @@ class Method:
 
 METHODS = (
     Method("LI, SAD", "SAD", Linear, "LI"),
-    Method("LI, SAD, holes filled", "SAD", lambda: Linear(LinearSettings(fill_holes=True))),
+    Method("LI, SAD, holes filled", "SAD", lambda: Linear(LinearSettings(fill=True))),
     Method("DILS, SAD", "SAD", Dils, "DILS_SAD"),
     Method("DILS, SAD, a layer a level", "SAD", lambda: Dils(DilsSettings("levels"))),
     Method("DILS, AD-Census", "AD-Census", Dils, "DILS_ADCensus"),
