@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, is_dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
@@ -134,9 +135,14 @@ class PluginTable:
         return Chosen(name, plugin, texts, values)
 
     def sources(self) -> Iterator[tuple[str, str]]:
-        """(name, distribution) of every plug-in; nothing is loaded."""
+        """(name, distribution) of every plug-in; nothing is loaded. Names that are taken are warned of."""
         yield from ((name, OWN_SOURCE) for name in self.own)
-        yield from ((name, _distribution(entry)) for name, entry in self._installed().items())
+        installed = self._installed()
+        for entry in self._entries:
+            if installed.get(entry.name) is not entry:
+                text = f"{_distribution(entry)}: its {self.kind} {entry.name} is ignored, the name is taken"
+                warnings.warn(text, MvCodecWarning, stacklevel=2)
+        yield from ((name, _distribution(entry)) for name, entry in installed.items())
 
     def load(self, name: str) -> Plugin:
         """The plug-in of a name that `sources` gave.
@@ -158,18 +164,18 @@ class PluginTable:
         )
 
     def _installed(self) -> dict[str, EntryPoint]:
+        """By name; mvcodec's own names stay what they are, and of two others the first one counts."""
+        found: dict[str, EntryPoint] = {}
+        for entry in self._entries:
+            if entry.name not in self.own:
+                found.setdefault(entry.name, entry)
+        return found
+
+    @cached_property
+    def _entries(self) -> tuple[EntryPoint, ...]:
         from importlib.metadata import entry_points
 
-        found: dict[str, EntryPoint] = {}
-        for entry in entry_points(group=self.group) if self.group else ():
-            if entry.name in self.own or entry.name in found:
-                text = (
-                    f"{_distribution(entry)}: the {self.kind} {entry.name} has a name that is taken already"
-                )
-                warnings.warn(f"{text}; it cannot be used", MvCodecWarning, stacklevel=4)
-            else:
-                found[entry.name] = entry
-        return found
+        return tuple(entry_points(group=self.group)) if self.group else ()
 
 
 def _loaded(entry: EntryPoint) -> Plugin:
