@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from mvcodec.array import CameraArray
@@ -19,9 +21,11 @@ from mvcodec.video.codec import PRESETS
 from mvcodec.video.codecs import CODECS
 
 
-def add_input(parser: argparse.ArgumentParser, what: str) -> None:
+def add_input(
+    parser: argparse.ArgumentParser, what: str, kind: Callable[[str], Path | str] = local_path
+) -> None:
     """``INPUT``, ``--grid`` and ``--real``."""
-    parser.add_argument("input", type=local_path, nargs="+", metavar="INPUT", help=what)
+    parser.add_argument("input", type=kind, nargs="+", metavar="INPUT", help=what)
     parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
     parser.add_argument(
         "--real",

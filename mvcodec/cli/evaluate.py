@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import re
 import warnings
+from collections.abc import Callable
+from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,15 +14,19 @@ from typing import TYPE_CHECKING, Any
 from mvcodec.array import CameraArray
 from mvcodec.capture import open_input, resolve_frames
 from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, positive_int
+from mvcodec.cli.cluster_options import add_cluster, place
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.progress import progress
+from mvcodec.cluster.connection import connected
+from mvcodec.cluster.places import Place
 from mvcodec.errors import MissingExtra, MvCodecWarning, OutputError
 from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codecs import ANCHOR_CODECS, CODECS
 from mvcodec.workers import thread_count
 
 if TYPE_CHECKING:
-    from mvcodec.evaluation.study import Study
+    from mvcodec.evaluation.points import CurvePoint
+    from mvcodec.evaluation.study import Study, StudyRun
 
 EXTRA = "evaluate"
 PACKAGES = ("bjontegaard", "matplotlib")
@@ -31,7 +37,7 @@ POINTS = "points"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``evaluate``."""
-    add_input(parser, "an array folder, or R*C videos in row order with --grid")
+    add_input(parser, "an array folder, or R*C videos in row order with --grid; or its URL", place)
     parser.add_argument(
         "--output",
         type=Path,
@@ -62,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="anchors coded side by side (default: as many as --threads)",
     )
+    add_cluster(parser)
     add_frames(parser, "frames of the input to evaluate")
     add_output_options(parser)
 
@@ -71,6 +78,14 @@ def run(arguments: argparse.Namespace) -> None:
     for package in PACKAGES:
         if find_spec(package) is None:
             raise MissingExtra(package, EXTRA)
+    output: Path = arguments.output
+    if output.exists() and not output.is_dir():
+        raise OutputError(output, "it is a file; a report is a folder")
+    with ExitStack() as stack:
+        _evaluate(arguments, stack)
+
+
+def _evaluate(arguments: argparse.Namespace, stack: ExitStack) -> None:
     from mvcodec.evaluation.document import every_warning
     from mvcodec.evaluation.fingerprint import examine
     from mvcodec.evaluation.points import PointStore
@@ -78,9 +93,7 @@ def run(arguments: argparse.Namespace) -> None:
     from mvcodec.evaluation.study import StudyRun
 
     output: Path = arguments.output
-    if output.exists() and not output.is_dir():
-        raise OutputError(output, "it is a file; a report is a folder")
-    source = open_input(arguments.input, grid=arguments.grid, real=arguments.real)
+    source = open_input(_inputs(arguments, stack), grid=arguments.grid, real=arguments.real)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     study = _study(source.array, arguments, find_range(source, chosen, arguments.disparity_range))
     facts = examine(source, chosen)
@@ -88,13 +101,34 @@ def run(arguments: argparse.Namespace) -> None:
     with progress("evaluate", None, quiet=arguments.quiet, unit="picture") as bar:
         measuring = StudyRun(study, source, chosen, facts, store, bar.update)
         bar.total = measuring.picture_count
-        points = measuring.measure()
+        points = _measured(arguments, measuring, bar.update)
     document = write_report(output, measuring, points)
     for text in every_warning(document):
         warnings.warn(text, MvCodecWarning, stacklevel=2)
     if not arguments.quiet:
         print(table(document))
         print(f"\nIn {output}: {', '.join(FILES)}")
+
+
+def _inputs(arguments: argparse.Namespace, stack: ExitStack) -> list[Path]:
+    """The inputs on this machine; those behind addresses are fetched, for workers to do the same."""
+    return [
+        stack.enter_context(Place(item).fetched()) if isinstance(item, str) else item
+        for item in arguments.input
+    ]
+
+
+def _measured(
+    arguments: argparse.Namespace, run: StudyRun, on_pictures: Callable[[int], object]
+) -> dict[str, list[CurvePoint]]:
+    """The points, measured in this process or by a cluster's workers."""
+    if arguments.cluster is None:
+        return run.measure()
+    from mvcodec.cluster.study import measure_on_cluster, opening_of
+
+    opening = opening_of(arguments.input, arguments.grid, arguments.real)
+    with connected(arguments.cluster, arguments.retries) as client:
+        return measure_on_cluster(client, run, opening, arguments.retries, on_pictures)
 
 
 def table(document: dict[str, Any]) -> str:

@@ -25,6 +25,7 @@ COMMANDS: dict[str, str] = {
     "render": "make pictures to take away: paths of the viewpoint, stereo, quilts, refocus",
     "info": "say what a file holds",
     "export-points": "write what the cameras see as points in space",
+    "batch": "run one of encode, decode, render, validate on many recordings, over the workers of a cluster",
     "join": "write segments of one stream into one file, without coding them again",
     "recover": "write a clean file out of a damaged or unfinished one",
     "validate": "check a file against the rules of the format, access unit by access unit",

@@ -148,8 +148,7 @@ class StudyRun:
     @property
     def picture_count(self) -> int:
         """What `on_pictures` counts to."""
-        pictures = len(self.chosen) * len(self.source.array.positions)
-        return sum(len(curve.qps) * self._weight(curve) * pictures for curve in self.study.curves)
+        return sum(len(curve.qps) * self.pictures_of(curve) for curve in self.study.curves)
 
     def measure(self) -> dict[str, list[CurvePoint]]:
         """The points of every curve by its name.
@@ -165,11 +164,11 @@ class StudyRun:
             try:
                 for curve in self.study.curves:
                     if curve.anchor is None:
-                        points[curve.name] = [self._point(curve, qp) for qp in curve.qps]
+                        points[curve.name] = [self.point(curve, qp) for qp in curve.qps]
                 with threads(self.study.jobs):
                     for curve in self.study.curves:
                         if curve.anchor is not None:
-                            waiting[curve.name] = [submit(self._point, curve, qp) for qp in curve.qps]
+                            waiting[curve.name] = [submit(self.point, curve, qp) for qp in curve.qps]
                 for name, jobs in waiting.items():
                     points[name] = [job.result() for job in jobs]
             except BaseException:
@@ -235,12 +234,21 @@ class StudyRun:
             "rate": None if span is None else asdict(config.rate_of_maps(array, span)),
         }
 
-    def _point(self, curve: Curve, qp: int) -> CurvePoint:
+    def pictures_of(self, curve: Curve) -> int:
+        """What `on_pictures` counts for each point of a curve."""
+        return self._weight(curve) * len(self.chosen) * len(self.source.array.positions)
+
+    def point(self, curve: Curve, qp: int) -> CurvePoint:
+        """A point of a curve, measured unless the store holds it.
+
+        Raises:
+            SettingError, InputError, OutputError: as the stages raise them.
+        """
         depends_on = self.depends_on(curve, qp)
         name = self.store.name(depends_on)
         point = self.store.find(name)
         if point is not None:
-            self._on_pictures(self._weight(curve) * len(self.chosen) * len(self.source.array.positions))
+            self._on_pictures(self.pictures_of(curve))
             return point
         point = self._anchor_point(curve, qp) if curve.anchor else self._own_point(name, qp)
         point = replace(point, versions=measuring_versions())
