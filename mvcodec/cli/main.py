@@ -19,6 +19,7 @@ from mvcodec.workers import THREADS_HELP, set_threads
 
 COMMANDS: dict[str, str] = {
     "sample": "render the sample scene as an array folder",
+    "rectify": "make a rectified array of what ordinary cameras see",
     "encode": "code an array of pictures or videos into one MCAP file",
     "decode": "decode a file and synthesise views from it",
     "play": "watch a file in the browser, from any viewpoint",

@@ -8,8 +8,9 @@ from mvcodec.cli.arguments import add_output_options, pair_of_sizes, positive_in
 from mvcodec.cli.info import count
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
-from mvcodec.output.sample import write_sample
-from mvcodec.scenes.scene import DEFAULT_SCENE, SCENES, SceneSettings, make_scene
+from mvcodec.output.sample import make_sample, write_sample
+from mvcodec.scenes.rough_rig import FLAWS, RoughRigSettings
+from mvcodec.scenes.scene import DEFAULT_SCENE, SCENES, SceneSettings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,15 +34,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="varies the scene (default: %(default)s)"
     )
+    parser.add_argument(
+        "--rig",
+        metavar="rough[:SEED][,only=FLAW,...]",
+        help="seen by imperfect cameras, with their exact truth in rig_truth.json; flaws:"
+        f" {', '.join(FLAWS)} (default: all of them)",
+    )
     add_output_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Render and write."""
     settings = SceneSettings(arguments.grid, arguments.frames, arguments.size, arguments.seed)
-    frames = make_scene(arguments.scene, settings).frame_count
+    rig = None if arguments.rig is None else RoughRigSettings.from_text(arguments.rig)
+    frames = make_sample(arguments.scene, settings, rig).frame_count
     with progress("render", frames, quiet=arguments.quiet) as bar:
-        scene = write_sample(arguments.output, arguments.scene, settings, lambda _done, _of: bar.update())
+        scene = write_sample(
+            arguments.output, arguments.scene, settings, lambda _done, _of: bar.update(), rig=rig
+        )
     if not arguments.quiet:
         array = scene.array
         grid = f"{array.rows} x {array.cols} views of {array.width} x {array.height} px"

@@ -1,4 +1,4 @@
-"""Renders lit shapes from parallel cameras by casting rays."""
+"""Renders lit shapes by casting rays: from parallel pinhole cameras, or from turned ones with lenses."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from mvcodec.kernels.raycast import Shapes
     from mvcodec.kernels.texture import Paint
 
+Matrix = NDArray[np.float64]
+
 _NEAREST_M = 0.05
 _CUBE = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _SQUARE = np.array([(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)])
@@ -26,16 +28,36 @@ _SQUARE = np.array([(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)])
 
 @dataclass(frozen=True, slots=True)
 class Optics:
-    """A pinhole camera that looks along z; the principal point is in the middle of its picture."""
+    """A camera: a pinhole where k1 and k2 are 0, else with a lens that distorts (see kernels/raycast.py).
+
+    Attributes:
+        width, height: of its pictures, px.
+        focal_px: focal length.
+        k1, k2: radial distortion; monotonic up to the corners of the picture.
+        principal_px: (cx, cy); None: the middle of the picture.
+    """
 
     width: int
     height: int
     focal_px: float
+    k1: float = 0.0
+    k2: float = 0.0
+    principal_px: tuple[float, float] | None = None
 
     @property
     def centre_px(self) -> tuple[float, float]:
         """(cx, cy): the principal point."""
-        return (self.width - 1) / 2, (self.height - 1) / 2
+        return self.principal_px or ((self.width - 1) / 2, (self.height - 1) / 2)
+
+    @property
+    def scales(self) -> tuple[float, float]:
+        """(least, greatest) factor by which the lens moves what the picture shows from its centre."""
+        cx, cy = self.centre_px
+        corner = np.hypot(max(cx, self.width - 1 - cx), max(cy, self.height - 1 - cy)) / self.focal_px
+        # Twice the corner's radius: what a barrel shows there lies farther out.
+        square = np.linspace(0.0, 2.0 * corner, 64) ** 2
+        factors = np.clip(1 + square * (self.k1 + square * self.k2), 0.0, None)
+        return float(factors.min()), float(factors.max())
 
 
 class LitScene:
@@ -58,34 +80,49 @@ class LitScene:
         self._turns = np.array([shape.turn for shape in spheres]).reshape(-1, 3, 3)
         self._paint = _paint([shapes[number] for number in order], light, order)
 
-    def render(self, optics: Optics, eye: Vector) -> tuple[Picture, FloatMap]:
-        """The picture uint8 (H, W, 3) RGB from `eye`, and float32 1/Z of each pixel's centre, 1/m."""
+    def render(
+        self, optics: Optics, eye: Vector, turn: Matrix | None = None, gain: float = 1.0
+    ) -> tuple[Picture, FloatMap]:
+        """The picture uint8 (H, W, 3) RGB from `eye`, and float32 1/Z of each pixel's centre, 1/m.
+
+        Args:
+            optics: of the camera.
+            eye: where it stands, m.
+            turn: float64 (3, 3), takes a direction in the scene's axes to one in the camera's; None:
+                the camera looks along z. Z is that of the camera's axes.
+            gain: factor on the light.
+        """
         from mvcodec.kernels.raycast import find_nearest, shade
 
-        shapes = self._before(optics, np.array(eye))
+        shapes = self._before(optics, np.array(eye), np.eye(3) if turn is None else turn)
+        paint = self._paint if gain == 1.0 else self._paint._replace(tints=self._paint.tints * gain)
         size = optics.height, optics.width
         numbers, inverse_depth = np.empty(size, np.int16), np.empty(size)
         picture = np.empty((*size, 3), np.uint8)
         find_nearest(shapes, numbers, inverse_depth)
-        shade(shapes, self._paint, numbers, picture)
+        shade(shapes, paint, numbers, picture)
         return picture, inverse_depth.astype(np.float32)
 
-    def _before(self, optics: Optics, eye: NDArray[np.float64]) -> Shapes:
+    def _before(self, optics: Optics, eye: Matrix, turn: Matrix) -> Shapes:
         """The shapes as one camera sees them."""
         from mvcodec.kernels.raycast import Shapes
 
-        towards = self._corners - eye
-        spheres = self._spheres - np.append(eye, 0.0)
-        flat_corners = towards[:, None] + np.einsum("ks,qsc->qkc", _SQUARE, self._edges)
+        towards = (self._corners - eye) @ turn.T
+        edges, normals = self._edges @ turn.T, self._normals @ turn.T
+        spheres = np.column_stack([(self._spheres[:, :3] - eye) @ turn.T, self._spheres[:, 3]])
+        flat_corners = towards[:, None] + np.einsum("ks,qsc->qkc", _SQUARE, edges)
         round_corners = spheres[:, None, :3] + spheres[:, None, 3:] * _CUBE
         return Shapes(
-            homographies=_homographies(towards, self._edges, self._normals),
+            homographies=_homographies(towards, edges, normals),
             spheres=spheres,
-            turns=self._turns,
+            turns=self._turns @ turn.T,
             boxes=np.concatenate([_pixel_boxes(flat_corners, optics), _pixel_boxes(round_corners, optics)]),
             focal_px=float(optics.focal_px),
             cx_px=optics.centre_px[0],
             cy_px=optics.centre_px[1],
+            k1=float(optics.k1),
+            k2=float(optics.k2),
+            axes=np.ascontiguousarray(turn.T),
         )
 
 
@@ -118,9 +155,11 @@ def _pixel_boxes(points: NDArray[np.float64], optics: Optics) -> NDArray[np.int6
     """
     depth = points[..., 2]
     size = np.array([optics.width, optics.height])
-    pixels = points[..., :2] / np.maximum(depth, _NEAREST_M)[..., None] * optics.focal_px + optics.centre_px
-    low = np.clip(np.floor(pixels.min(axis=1)), 0, size)
-    high = np.clip(np.ceil(pixels.max(axis=1)) + 1, 0, size)
+    offsets = points[..., :2] / np.maximum(depth, _NEAREST_M)[..., None] * optics.focal_px
+    # A lens moves each point of an edge by a factor of its own, all within these.
+    ends = np.stack([offsets * scale for scale in optics.scales], axis=1)
+    low = np.clip(np.floor(ends.min(axis=(1, 2)) + optics.centre_px), 0, size)
+    high = np.clip(np.ceil(ends.max(axis=(1, 2)) + optics.centre_px) + 1, 0, size)
     boxes = np.concatenate([low, high], axis=1).astype(np.int64)
     # What reaches behind the camera may cover any of the picture; what is all behind, none.
     boxes[depth.min(axis=1) < _NEAREST_M] = 0, 0, optics.width, optics.height

@@ -14,8 +14,9 @@ from mvcodec.array import MAX_GRID_SIDE, MAX_PICTURE_SIDE, Calibration, CameraAr
 from mvcodec.errors import SettingError
 from mvcodec.frames import FloatMap, Picture
 from mvcodec.scenes.lighting import LightBaker
-from mvcodec.scenes.renderer import LitScene, Optics
+from mvcodec.scenes.renderer import LitScene, Matrix, Optics
 from mvcodec.scenes.room import FLOOR_FROM_M, FLOOR_M, LIGHTING, NEAREST_M, WALL_M, Room
+from mvcodec.scenes.solids import Vector
 
 ROOM_FPS = 24.0
 # Of the whole rig, whatever its grid: 20 px of disparity between its ends at the wall, at a width of 640.
@@ -24,6 +25,7 @@ MAX_FRAMES = 100_000
 _ROOM_GRID, _ROOM_FRAMES, _ROOM_SIZE = (5, 5), 24, (640, 360)
 _MIN_SIDE = 16
 _TALLEST = 4
+_LIT_FRAMES = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +129,7 @@ class RoomScene:
         )
         self._room = Room.of_seed(settings.seed)
         self._standing = self._room.standing()
-        self._lit: tuple[int, LitScene] | None = None
+        self._lit: dict[int, LitScene] = {}
         self._lock = threading.Lock()
 
     def render(self, viewpoint: Viewpoint, frame: int) -> tuple[Picture, FloatMap]:
@@ -140,13 +142,38 @@ class RoomScene:
         scale = np.float32(self._optics.focal_px * self._step_m)
         return picture, inverse_depth * scale
 
+    def look(
+        self,
+        place_steps: Vector,
+        frame: int,
+        optics: Optics | None = None,
+        turn: Matrix | None = None,
+        gain: float = 1.0,
+    ) -> tuple[Picture, FloatMap]:
+        """The room from any camera, which need not be one of the array's.
+
+        Args:
+            place_steps: (x, y, z) in steps of the grid from view (0, 0); x right, y down, z forward.
+            frame: may lie before the first one.
+            optics, turn, gain: as in LitScene.render; None: those of the array's cameras.
+
+        Returns:
+            uint8 (H, W, 3) RGB, and float32 (H, W): 1/Z of each pixel's centre in the camera's axes, 1/m.
+        """
+        x, y, z = place_steps
+        right = (x - (self.array.cols - 1) / 2) * self._step_m
+        down = (y - (self.array.rows - 1) / 2) * self._step_m
+        return self._at(frame).render(optics or self._optics, (right, down, z * self._step_m), turn, gain)
+
     def _at(self, frame: int) -> LitScene:
-        """The scene at a frame, lit; kept until another frame is asked for."""
+        """The scene at a frame, lit; kept until others are asked for: late cameras see the one before."""
         with self._lock:
-            if self._lit is None or self._lit[0] != frame:
+            if frame not in self._lit:
+                while len(self._lit) >= _LIT_FRAMES:
+                    del self._lit[min(self._lit)]
                 moving = self._room.moving(frame / ROOM_FPS)
-                self._lit = frame, LitScene([*self._standing, *moving], _baker(self._room).bake(moving))
-            return self._lit[1]
+                self._lit[frame] = LitScene([*self._standing, *moving], _baker(self._room).bake(moving))
+            return self._lit[frame]
 
 
 @lru_cache(maxsize=4)

@@ -1,0 +1,95 @@
+"""``mvcodec rectify``: pictures of an ordinary rig in, a rectified array (or the rig's calibration) out."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from mvcodec.capture import ArraySource, open_input, resolve_frames
+from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes
+from mvcodec.cli.paths import local_path
+from mvcodec.cli.progress import progress
+from mvcodec.errors import SettingError
+from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
+from mvcodec.output.atomic import write_bytes
+from mvcodec.rigs.calibration import Calibrated, calibrate
+from mvcodec.rigs.framing import CROPS
+from mvcodec.rigs.remap import DEFAULT_INTERPOLATION, INTERPOLATIONS, RectifiedSource, Rectifier
+from mvcodec.rigs.rig import rig_text
+
+RIG_NAME = "rig.json"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``rectify``."""
+    parser.add_argument(
+        "input",
+        type=local_path,
+        nargs="+",
+        metavar="INPUT",
+        help="an array folder, or R*C videos in row order with --grid",
+    )
+    parser.add_argument(
+        "output",
+        type=local_path,
+        metavar="OUT_FOLDER|RIG.json",
+        help="a folder for the rectified pictures and the rig, or a .json file for the rig alone",
+    )
+    parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
+    parser.add_argument(
+        "--crop",
+        choices=CROPS,
+        default="common",
+        help="common: what all cameras see; all: full size with black borders (default: %(default)s)",
+    )
+    parser.add_argument("--size", type=pair_of_sizes, metavar="WxH", help="of the rectified pictures, px")
+    parser.add_argument(
+        "--match-colours",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="make the cameras equally bright (default: yes)",
+    )
+    parser.add_argument(
+        "--interpolation",
+        choices=tuple(INTERPOLATIONS),
+        default=DEFAULT_INTERPOLATION,
+        help="between pixels (default: %(default)s)",
+    )
+    add_frames(parser, "frames of the input to use")
+    add_output_options(parser, "print the rig as JSON")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Calibrate, and write what was asked for."""
+    output: Path = arguments.output
+    if output.resolve() in [path.resolve() for path in arguments.input]:
+        raise SettingError("OUT", output, "another place than INPUT")
+    source = open_input(arguments.input, grid=arguments.grid, real="all")
+    chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
+    found = calibrate(source, chosen, crop=arguments.crop, size=arguments.size)
+    text = rig_text(found.rig)
+    if output.suffix.lower() == ".json":
+        write_bytes(output, text.encode())
+    else:
+        _write_folder(source, chosen, found, arguments)
+        write_bytes(output / RIG_NAME, text.encode())
+    if arguments.json:
+        print(json.dumps(found.rig.document()))
+    elif not arguments.quiet:
+        print(f"{output}: {found.summary()}")
+
+
+def _write_folder(
+    source: ArraySource, chosen: range, found: Calibrated, arguments: argparse.Namespace
+) -> None:
+    rectifier = Rectifier(found.rig, arguments.interpolation, match_colours=arguments.match_colours)
+    straight = RectifiedSource(source, rectifier)
+    facts = ArrayFacts.of(straight.array)
+    with (
+        ArrayFolderWriter(arguments.output, facts) as writer,
+        progress("rectify", len(chosen), quiet=arguments.quiet) as bar,
+    ):
+        for frame_set in straight.frame_sets(slice(chosen.start, chosen.stop)):
+            writer.push(frame_set.pictures)
+            bar.update()

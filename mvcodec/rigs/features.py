@@ -1,0 +1,198 @@
+"""Points of the scene that several cameras see: found, matched robustly, and followed through the rig."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mvcodec.array import Position
+from mvcodec.frames import FrameSet, Picture
+from mvcodec.workers import run_all
+
+MOST_FEATURES = 2500
+"""A picture; the strongest ones count."""
+
+RATIO = 0.8
+"""A match must be that much better than the second best (Lowe 2004)."""
+
+MAGSAC_PX = 3.0
+"""How far off a match may be from the two cameras' epipolar geometry before lenses are known."""
+
+FEWEST = 12
+"""Matches that two pictures must share to count as matched."""
+
+_CONTRAST = 0.015
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Features:
+    """What is distinctive in one picture.
+
+    Attributes:
+        xy_px: float64 (N, 2), where (0, 0 is the centre of the first pixel).
+        angles_deg: float64 (N,), the direction of each.
+        descriptors: float32 (N, 128).
+    """
+
+    xy_px: NDArray[np.float64]
+    angles_deg: NDArray[np.float64]
+    descriptors: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracks:
+    """Points of the scene, and where the cameras see them.
+
+    Attributes:
+        cameras: N of them.
+        xy_px: float64 (T, N, 2), of each point in each camera's picture; anything where it isn't seen.
+        seen: bool (T, N), two or more of each point.
+        frame: int64 (T,), index into the frame sets that were given.
+    """
+
+    cameras: tuple[Position, ...]
+    xy_px: NDArray[np.float64]
+    seen: NDArray[np.bool_]
+    frame: NDArray[np.int64]
+
+    def kept(self, seen: NDArray[np.bool_]) -> Tracks:
+        """Some of the observations, (T, N); points that fewer than two of them show go."""
+        whole = seen.sum(axis=1) >= 2
+        return Tracks(self.cameras, self.xy_px[whole], seen[whole], self.frame[whole])
+
+
+@dataclass(frozen=True, slots=True)
+class PairCount:
+    """How well two pictures were matched: by the ratio test, and of these by one epipolar geometry."""
+
+    one: Position
+    other: Position
+    matched: int
+    agreed: int
+
+
+def find_features(picture: Picture, most: int = MOST_FEATURES) -> Features:
+    """SIFT features (Lowe 2004) of uint8 (H, W, 3) RGB."""
+    grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+    sift = cv2.SIFT.create(nfeatures=most, contrastThreshold=_CONTRAST)
+    points, descriptors = sift.detectAndCompute(grey, None)
+    if descriptors is None:
+        return Features(np.empty((0, 2)), np.empty(0), np.empty((0, 128), np.float32))
+    xy = np.array([point.pt for point in points], np.float64)
+    return Features(xy, np.array([point.angle for point in points]), np.asarray(descriptors, np.float32))
+
+
+def match(one: Features, other: Features, ratio: float = RATIO) -> NDArray[np.int64]:
+    """(M, 2): indices of features that are each other's best match, and clearly."""
+    if min(len(one.descriptors), len(other.descriptors)) < 2:
+        return np.empty((0, 2), np.int64)
+    products = one.descriptors @ other.descriptors.T
+    squares = [np.einsum("nd,nd->n", f.descriptors, f.descriptors) for f in (one, other)]
+    distances = np.maximum(squares[0][:, None] + squares[1][None] - 2 * products, 0)
+    best = distances.argmin(axis=1)
+    back = distances.argmin(axis=0)
+    rows = np.arange(len(best))
+    two = np.partition(distances, 1, axis=1)[:, :2]
+    clear = (two[:, 0] < ratio**2 * two[:, 1]) & (back[best] == rows)
+    return np.stack([rows[clear], best[clear]], axis=1).astype(np.int64)
+
+
+def agreeing(
+    one: NDArray[np.float64], other: NDArray[np.float64], threshold_px: float = MAGSAC_PX
+) -> NDArray[np.bool_]:
+    """(M,): which matches agree with one epipolar geometry, by MAGSAC++ (Barath et al. 2020)."""
+    if len(one) < FEWEST:
+        return np.zeros(len(one), bool)
+    _, mask = cv2.findFundamentalMat(one, other, cv2.USAC_MAGSAC, threshold_px, 0.999, 2000)
+    return np.zeros(len(one), bool) if mask is None else mask.ravel().astype(bool)
+
+
+def neighbours(cameras: Sequence[Position]) -> list[tuple[Position, Position]]:
+    """Pairs beside, above and across from each other on the grid of the cameras."""
+    rows = sorted({row for row, _ in cameras})
+    cols = sorted({col for _, col in cameras})
+    pairs = []
+    for row, col in cameras:
+        i, j = rows.index(row), cols.index(col)
+        for down, across in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            if i + down < len(rows) and 0 <= j + across < len(cols):
+                other = rows[i + down], cols[j + across]
+                if other in cameras:
+                    pairs.append(((row, col), other))
+    return pairs
+
+
+def find_tracks(
+    frame_sets: Sequence[FrameSet], cameras: Sequence[Position]
+) -> tuple[Tracks, list[PairCount]]:
+    """Points that at least two of the cameras see at the same time.
+
+    Args:
+        frame_sets: with the pictures of these cameras.
+        cameras: places on the grid.
+
+    Returns:
+        The points, and how well each pair of neighbours was matched, all frame sets together.
+    """
+    order = tuple(cameras)
+    pairs = neighbours(order)
+    parts, counts = [], {pair: [0, 0] for pair in pairs}
+    for number, frame_set in enumerate(frame_sets):
+        pictures = [frame_set.pictures[camera] for camera in order]
+        found = dict(zip(order, run_all(find_features, pictures), strict=True))
+        matched = run_all(_match_pair, [found[one] for one, _ in pairs], [found[other] for _, other in pairs])
+        links = {}
+        for pair, (every, kept) in zip(pairs, matched, strict=True):
+            counts[pair][0] += every
+            counts[pair][1] += len(kept)
+            links[pair] = kept
+        parts.append(_linked(order, found, links, number))
+    told = [PairCount(*pair, *counts[pair]) for pair in pairs]
+    return _joined(order, parts), told
+
+
+def _match_pair(one: Features, other: Features) -> tuple[int, NDArray[np.int64]]:
+    """How many matches there are, and those that agree with one geometry."""
+    pairs = match(one, other)
+    return len(pairs), pairs[agreeing(one.xy_px[pairs[:, 0]], other.xy_px[pairs[:, 1]])]
+
+
+def _linked(
+    cameras: Sequence[Position],
+    found: Mapping[Position, Features],
+    links: Mapping[tuple[Position, Position], NDArray[np.int64]],
+    frame: int,
+) -> Tracks:
+    """Tracks of one frame set: features that matches join. One that a camera would see twice is none."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    counts = [len(found[camera].xy_px) for camera in cameras]
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    number = {camera: index for index, camera in enumerate(cameras)}
+    ends = [kept + np.array([starts[number[end]] for end in pair]) for pair, kept in links.items()]
+    edges = np.concatenate([np.empty((0, 2), np.int64), *ends])
+    total = int(starts[-1])
+    graph = coo_array((np.ones(len(edges), np.int8), (edges[:, 0], edges[:, 1])), shape=(total, total))
+    groups, label = connected_components(graph, directed=False)
+    camera = np.repeat(np.arange(len(cameras)), counts)
+    times = np.zeros((groups, len(cameras)), np.int64)
+    np.add.at(times, (label, camera), 1)
+    xy = np.zeros((groups, len(cameras), 2))
+    xy[label, camera] = np.concatenate([found[c].xy_px for c in cameras])
+    usable = (times.max(axis=1) == 1) & (times.sum(axis=1) >= 2)
+    seen = times[usable] > 0
+    return Tracks(tuple(cameras), xy[usable], seen, np.full(len(seen), frame))
+
+
+def _joined(cameras: tuple[Position, ...], parts: Sequence[Tracks]) -> Tracks:
+    return Tracks(
+        cameras,
+        np.concatenate([part.xy_px for part in parts]),
+        np.concatenate([part.seen for part in parts]),
+        np.concatenate([part.frame for part in parts]),
+    )
