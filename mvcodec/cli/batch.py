@@ -15,10 +15,11 @@ from mvcodec.cli.cluster_options import add_cluster
 from mvcodec.cli.info import count
 from mvcodec.cli.progress import progress
 from mvcodec.cluster.batch import SEGMENTED, Batch, Job, Option, Progress, run_batch
-from mvcodec.cluster.connection import connected
+from mvcodec.cluster.connection import connected, local_workers
 from mvcodec.cluster.places import Place
 from mvcodec.cluster.recordings import find_recordings
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
+from mvcodec.workers import check_threads, thread_count
 
 PURPOSES = {
     "encode": "code array folders, in segments that are joined",
@@ -29,6 +30,9 @@ PURPOSES = {
 
 OWN = ("--json", "--quiet", "--overwrite", "-y", "--dry-run", "--continues")
 """Options of those commands that mean something else here, or nothing."""
+
+COMPUTING = ("encode", "decode", "render")
+"""Those that --threads means something to."""
 
 ENDINGS = {"encode": ".mcap", "validate": ".json", "render": ".mp4"}
 FORMAT_ENDINGS = {"mosaic": ".mp4", "mcap": ".mcap"}
@@ -105,6 +109,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         command.add_argument(
             "--json", action="store_true", help="print what became of each recording as JSON"
         )
+        if name in COMPUTING:
+            command.add_argument(
+                "--threads",
+                type=int,
+                metavar="N",
+                help="of each task (default: local workers share the cores, others use all of theirs)",
+            )
         _forward(command, name)
 
 
@@ -121,6 +132,7 @@ def run(arguments: argparse.Namespace) -> None:
         _segment(arguments),
         arguments.retries,
         arguments.overwrite,
+        _threads(arguments),
     )
     _check_segment(batch)
     with (
@@ -204,6 +216,15 @@ def _check_segment(batch: Batch) -> None:
         raise SettingError("--segment", f"with one {batch.ending} file", "--format array or png: folders")
     if "--frames" in names:
         raise SettingError("--segment", "with --frames", "one of the two")
+
+
+def _threads(arguments: argparse.Namespace) -> int | None:
+    given: int | None = getattr(arguments, "threads", None)
+    check_threads(given)
+    workers = local_workers(arguments.cluster)
+    if given is not None or workers is None or arguments.what not in COMPUTING:
+        return given
+    return max(thread_count() // workers, 1)
 
 
 def _seconds(text: str) -> float:

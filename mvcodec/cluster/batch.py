@@ -41,6 +41,7 @@ class Batch:
         segment_s: length of segments, s; None: a recording is one task.
         retries: how often a task that was killed is tried again.
         overwrite: outputs that were made with other options, or not by a batch, are made anew.
+        threads: of each task; None: all cores of the worker's machine.
     """
 
     command: str
@@ -50,6 +51,7 @@ class Batch:
     segment_s: float | None = None
     retries: int = 2
     overwrite: bool = False
+    threads: int | None = None
 
 
 @dataclass(slots=True)
@@ -274,6 +276,8 @@ class _Run:
         options: Sequence[str],
         target: str | None,
     ) -> None:
+        if self._batch.threads is not None and command != "info":
+            options = [*options, f"--threads={self._batch.threads}"]
         arguments = (command, job.recording.source, tuple(options), target, self._name, mvcodec.__version__)
         self._send(job, what, follow, run_command, arguments)
 
@@ -285,7 +289,7 @@ class _Run:
         function: Callable[..., Outcome],
         arguments: tuple[Any, ...],
     ) -> None:
-        # The dashboard groups tasks by what stands before the key's tuple: encode-room, join-room ...
+        # The scheduler's dashboard shows these names, and groups them by their words.
         key = f"{self._batch.command}-{what}-{job.recording.name}-{uuid.uuid4().hex[:8]}"
         self._jobs[key] = job, follow
         future = self._client.submit(function, *arguments, key=key, pure=False, retries=self._batch.retries)

@@ -30,6 +30,12 @@ def check_cluster(text: str) -> str:
     return text
 
 
+def local_workers(cluster: str) -> int | None:
+    """The workers of a cluster of this machine's own; None for another's."""
+    local = _LOCAL.fullmatch(cluster)
+    return None if local is None else int(local[1] or os.cpu_count() or 1)
+
+
 @contextmanager
 def connected(cluster: str, retries: int) -> Iterator[Any]:
     """A client of the cluster, a `distributed.Client`. A local cluster ends with the block.
@@ -49,7 +55,7 @@ def connected(cluster: str, retries: int) -> Iterator[Any]:
         import dask
     except ImportError as error:
         raise MissingExtra(str(error.name), EXTRA) from None
-    local = _LOCAL.fullmatch(cluster)
+    workers = local_workers(cluster)
     # What workers log is told by us, in one line for each recording.
     own_settings = {"distributed.scheduler.allowed-failures": retries, "logging.distributed": "critical"}
     with dask.config.set(own_settings):
@@ -57,7 +63,7 @@ def connected(cluster: str, retries: int) -> Iterator[Any]:
             import distributed
         except ImportError as error:
             raise MissingExtra(str(error.name), EXTRA) from None
-        if local is None:
+        if workers is None:
             try:
                 client = distributed.Client(cluster, timeout=CONNECT_SECONDS)
             except (OSError, TimeoutError) as error:
@@ -66,7 +72,6 @@ def connected(cluster: str, retries: int) -> Iterator[Any]:
             with client:
                 yield client
             return
-        workers = int(local[1] or os.cpu_count() or 1)
         with (
             distributed.LocalCluster(
                 n_workers=workers,
