@@ -1,0 +1,181 @@
+"""The picture that predicts another one: rendered from decoded planes and maps, the same bits everywhere.
+
+Encoder and decoder both call this; FORMAT.md ("Predicted pictures") says what comes out, for other decoders.
+All is whole numbers. `Layered` renders better pictures to look at; it may change, and this may not.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mvcodec.array import CameraArray, Position, Viewpoint
+from mvcodec.synthesis.bands import run_in_bands
+from mvcodec.video.codec import Plane, Planes
+
+SPREAD = 205
+"""1024ths of a squared cell; a camera at distance b counts 1 / (SPREAD + 1024 b^2)."""
+
+SHARPNESS = -0.7
+"""Keys' parameter a of the cubic fetch."""
+
+BORDER = 2
+IntMap = NDArray[np.int32]
+
+
+def fine_disparities(codes: Plane, range_px: tuple[float, float]) -> IntMap:
+    """Code values of a map as whole 64ths of a pixel: floor(64 (lo + c (hi - lo) / 255) + 1/2)."""
+    low, high = range_px
+    table = np.floor(64 * (low + np.arange(256) * (high - low) / 255) + 0.5).astype(np.int32)
+    return table[codes]
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionSource:
+    """A decoded camera (or view) that predictions are made from.
+
+    Attributes:
+        place: where it stands.
+        planes: as decoded, even sizes.
+        disparity: int32 (H, W) of the planes' size, 64ths of a pixel.
+    """
+
+    place: Position
+    planes: Planes
+    disparity: IntMap
+
+    @cached_property
+    def luma(self) -> Plane:
+        """Luma, continued by BORDER."""
+        return np.pad(self.planes.y, BORDER, mode="edge")
+
+    @cached_property
+    def chroma(self) -> Plane:
+        """uint8 (2, H / 2 + 4, W / 2 + 4): Cb and Cr, continued by BORDER."""
+        return np.stack([np.pad(plane, BORDER, mode="edge") for plane in (self.planes.u, self.planes.v)])
+
+
+def full_map(codes: Plane, luma: Plane, range_px: tuple[float, float], scale: int) -> IntMap:
+    """A decoded map at the size of its picture's planes, 64ths of a pixel.
+
+    Args:
+        codes: uint8, the map's luma as decoded.
+        luma: uint8 (H, W), the picture's as decoded.
+        scale: the header's `disparity_scale`.
+    """
+    from mvcodec.kernels.prediction_depth import enlarge
+
+    height, width = luma.shape
+    small = fine_disparities(codes, range_px)
+    if scale == 1:
+        return small
+    found = np.empty((height, width), np.int32)
+    enlarge(np.ascontiguousarray(small[: height // 2, : width // 2]), luma, found)
+    return found
+
+
+def predicted_disparity(
+    array: CameraArray,
+    maps: Mapping[Position, IntMap],
+    place: Position,
+    range_px: tuple[float, float],
+    pool: Executor,
+) -> IntMap:
+    """Disparity at a place from the maps of cameras around it: moved there, put to the vote, filled."""
+    from mvcodec.kernels.prediction_depth import UNKNOWN, fill, splat, vote
+
+    cameras = sorted(maps)
+    shape = next(iter(maps.values())).shape
+    moved = np.empty((len(cameras), *shape), np.int32)
+    jobs = [
+        pool.submit(splat, maps[camera], *_shift(array, camera, place), out)
+        for camera, out in zip(cameras, moved, strict=True)
+    ]
+    for job in jobs:
+        job.result()
+    voted = np.empty(shape, np.int32)
+    run_in_bands(pool, shape[0], vote, moved, _weights(array, cameras, place), voted)
+    # Whole numbers below 2^24 are exact in float32.
+    found = cv2.medianBlur(voted.astype(np.float32), 3).astype(np.int32)
+    assert np.float32(UNKNOWN) == UNKNOWN
+    fill(found, int(fine_disparities(np.zeros((1, 1), np.uint8), range_px)[0, 0]))
+    return found
+
+
+def predict(
+    array: CameraArray,
+    sources: Sequence[PredictionSource],
+    place: Position,
+    disparity: IntMap,
+    pool: Executor,
+) -> Planes:
+    """The planes of a place, predicted from the sources that see each pixel.
+
+    Args:
+        disparity: int32 (H, W) at the place, see `predicted_disparity`; or the place's own decoded map.
+    """
+    from mvcodec.kernels.prediction_colour import predict_chroma, predict_luma
+
+    ordered = sorted(sources, key=lambda source: source.place)
+    maps = np.stack([source.disparity for source in ordered])
+    places = [source.place for source in ordered]
+    shifts = np.array([_shift(array, camera, place) for camera in places], np.int64)
+    weights = _weights(array, places, place)
+    height, width = disparity.shape
+    y = np.empty((height, width), np.uint8)
+    chroma = np.empty((2, height // 2, width // 2), np.uint8)
+    luma_planes = np.stack([source.luma for source in ordered])
+    run_in_bands(pool, height, predict_luma, luma_planes, maps, shifts, weights, CUBIC, disparity, y)
+    chroma_planes = np.stack([source.chroma for source in ordered])
+    run_in_bands(
+        pool, height // 2, predict_chroma, chroma_planes, maps, shifts, weights, LINEAR, disparity, chroma
+    )
+    return Planes(y, chroma[0], chroma[1])
+
+
+def checksum(planes: Sequence[Planes]) -> int:
+    """CRC-32 of predictions: rows of Y, Cb and Cr, one picture after the other."""
+    value = 0
+    for picture in planes:
+        for plane in (picture.y, picture.u, picture.v):
+            value = zlib.crc32(np.ascontiguousarray(plane).data, value)
+    return value
+
+
+def _shift(array: CameraArray, camera: Position, place: Position) -> tuple[int, int]:
+    """What a pixel moves (left, up) from a camera to a place, 65536ths of a pixel for each of disparity."""
+    right, down = array.shift_per_disparity(camera, Viewpoint(*place))
+    return int(np.floor(65536 * right + 0.5)), int(np.floor(65536 * down + 0.5))
+
+
+def _weights(array: CameraArray, cameras: Sequence[Position], place: Position) -> NDArray[np.int64]:
+    def weight(camera: Position) -> int:
+        across = (place[1] - camera[1]) / array.col_step if array.col_step else 0.0
+        down = (place[0] - camera[0]) / array.row_step if array.row_step else 0.0
+        return (1 << 20) // (SPREAD + int(1024 * (across * across + down * down) + 0.5))
+
+    return np.array([max(weight(camera), 1) for camera in cameras], np.int64)
+
+
+def _cubic_taps() -> NDArray[np.int64]:
+    """(16, 4): Keys' cubic in 128ths at sixteenths of a pixel; the second tap takes what rounding leaves."""
+    a = SHARPNESS
+    rows = []
+    for phase in range(16):
+        t = phase / 16
+        outer = [a * s**3 - 5 * a * s**2 + 8 * a * s - 4 * a for s in (1 + t, 2 - t)]
+        inner = (a + 2) * (1 - t) ** 3 - (a + 3) * (1 - t) ** 2 + 1
+        first, third, fourth = (int(np.floor(128 * tap + 0.5)) for tap in (outer[0], inner, outer[1]))
+        rows.append([first, 128 - first - third - fourth, third, fourth])
+    return np.array(rows, np.int64)
+
+
+CUBIC = _cubic_taps()
+LINEAR = np.array([[128 - 8 * phase, 8 * phase] for phase in range(16)], np.int64)

@@ -1,0 +1,149 @@
+"""Predicted pictures: kernels against their twins; the same bits on any processor, with any threads."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import prediction_twins as twins
+import pytest
+from coding import make_array
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from plane_scene import Plane, PlaneScene
+
+from mvcodec.array import CameraArray, Viewpoint
+from mvcodec.kernels import prediction_colour, prediction_depth
+from mvcodec.synthesis import prediction
+from mvcodec.synthesis.prediction import PredictionSource, checksum, predict, predicted_disparity
+from mvcodec.video.codec import Planes
+from mvcodec.video.colour import to_planes
+
+SEEDS, SIZES = st.integers(0, 2**32 - 1), st.tuples(st.integers(1, 12), st.integers(1, 14))
+SHIFTS = st.tuples(st.integers(-(1 << 17), 1 << 17), st.integers(-(1 << 17), 1 << 17))
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, SIZES)
+def test_enlarging_is_its_twin(seed: int, size: tuple[int, int]) -> None:
+    rng = np.random.default_rng(seed)
+    small = rng.integers(-300, 300, (-(-size[0] // 2), -(-size[1] // 2)), dtype=np.int32)
+    luma = rng.integers(0, 256, size, dtype=np.uint8)
+    found = np.empty(size, np.int32)
+    prediction_depth.enlarge(small, luma, found)
+    np.testing.assert_array_equal(found, twins.enlarge(small, luma, size))
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, SIZES, SHIFTS)
+def test_moving_is_its_twin(seed: int, size: tuple[int, int], shift: tuple[int, int]) -> None:
+    values = np.random.default_rng(seed).integers(-200, 400, size, dtype=np.int32)
+    found = np.empty(size, np.int32)
+    prediction_depth.splat(values, *shift, found)
+    np.testing.assert_array_equal(found, twins.splat(values, *shift))
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, SIZES, st.integers(1, 4))
+def test_voting_and_filling_are_their_twins(seed: int, size: tuple[int, int], count: int) -> None:
+    rng = np.random.default_rng(seed)
+    moved = rng.integers(-200, 200, (count, *size), dtype=np.int32)
+    moved[rng.random(moved.shape) < 0.5] = prediction_depth.UNKNOWN
+    weights = rng.integers(1, 5000, count)
+    found = np.empty(size, np.int32)
+    prediction_depth.vote(moved, weights, found, 0, size[0])
+    np.testing.assert_array_equal(found, twins.vote(moved, weights))
+    filled = twins.fill(found, -77)
+    prediction_depth.fill(found, -77)
+    np.testing.assert_array_equal(found, filled)
+
+
+@settings(max_examples=25, deadline=None)
+@given(SEEDS, st.tuples(st.integers(1, 5), st.integers(1, 6)), st.integers(1, 3))
+def test_fetching_is_its_twin(seed: int, half: tuple[int, int], count: int) -> None:
+    rng = np.random.default_rng(seed)
+    height, width = 2 * half[0], 2 * half[1]
+    maps = rng.choice([-90, 0, 64, 130], (count, height, width)).astype(np.int32)
+    disparity = rng.choice([-90, 0, 64, 500], (height, width)).astype(np.int32)
+    shifts, weights = rng.integers(-70000, 70000, (count, 2)), rng.integers(1, 5000, count)
+    luma = rng.integers(0, 256, (count, height + 4, width + 4), dtype=np.uint8)
+    chroma = rng.integers(0, 256, (count, 2, half[0] + 4, half[1] + 4), dtype=np.uint8)
+    y, uv = np.empty((height, width), np.uint8), np.empty((2, *half), np.uint8)
+    common = maps, shifts, weights
+    prediction_colour.predict_luma(luma, *common, prediction.CUBIC, disparity, y, 0, height)
+    prediction_colour.predict_chroma(chroma, *common, prediction.LINEAR, disparity, uv, 0, half[0])
+    np.testing.assert_array_equal(y, twins.predict(luma, *common, prediction.CUBIC, disparity, 1))
+    for plane in (0, 1):
+        expected = twins.predict(chroma[:, plane], *common, prediction.LINEAR, disparity, 2)
+        np.testing.assert_array_equal(uv[plane], expected)
+
+
+def test_the_taps_are_the_formats() -> None:
+    assert prediction.CUBIC.sum(axis=1).tolist() == [128] * 16
+    assert prediction.CUBIC[[0, 4, 8, 12]].tolist() == [
+        [0, 128, 0, 0],
+        [-13, 112, 33, -4],
+        [-11, 75, 75, -11],
+        [-4, 33, 112, -13],
+    ]
+    assert prediction.LINEAR[5].tolist() == [88, 40]
+
+
+def scene_sources(array: CameraArray) -> tuple[PlaneScene, list[PredictionSource]]:
+    scene = PlaneScene(array, 4, (Plane(8, (24, 40, 60, 80)), Plane(12, (10, 84, 40, 100))))
+    sources = []
+    for camera in array.real:
+        picture, values = scene.render(Viewpoint(*camera))
+        fine = np.rint(64 * values).astype(np.int32)
+        sources.append(PredictionSource(camera, to_planes(picture), fine))
+    return scene, sources
+
+
+def predicted(workers: int = 2) -> tuple[Planes, Planes]:
+    """A view in the middle and a camera from the three others; and what is there."""
+    array = CameraArray(3, 3, 128, 80, 10.0, (0, 2), (0, 2), make_array(128, 80).calibration)
+    scene, sources = scene_sources(array)
+    with ThreadPoolExecutor(workers) as pool:
+        maps = {source.place: source.disparity for source in sources}
+        middle = predicted_disparity(array, maps, (1, 1), (0.0, 16.0), pool)
+        found = predict(array, sources, (1, 1), middle, pool)
+        corner = predict(array, sources[:3], (2, 2), sources[3].disparity, pool)
+    expected = to_planes(scene.render(Viewpoint(1, 1))[0])
+    assert np.abs(found.y.astype(int) - expected.y).mean() < 1
+    unlike = np.abs(corner.y.astype(int) - sources[3].planes.y) > 2
+    assert unlike.mean() < 0.25
+    return found, corner
+
+
+def test_planes_are_predicted_where_cameras_see_them_whatever_the_threads() -> None:
+    assert checksum(predicted(1)) == checksum(predicted(2))
+
+
+PROGRAM = """
+import sys
+sys.path.insert(0, {tests!r})
+from test_prediction_kernels import checksum, predicted
+print(checksum(predicted()))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("features", ["", "+sse2,+sse4.2", "+avx2,+fma"])
+def test_the_bits_are_the_same_on_other_processors(features: str, tmp_path: Path) -> None:
+    """Numba compiles for a processor that has other instructions, OpenCV runs without any of its own."""
+    environment = {
+        **os.environ,
+        "NUMBA_CPU_NAME": "generic",
+        "NUMBA_CPU_FEATURES": features,
+        "NUMBA_CACHE_DIR": str(tmp_path),
+        "OPENCV_CPU_DISABLE": "AVX2,AVX,SSE4.2,SSE4.1,SSSE3,FP16",
+    }
+    program = PROGRAM.format(tests=str(Path(__file__).parent))
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+    )
+    assert int(done.stdout) == checksum(predicted())
