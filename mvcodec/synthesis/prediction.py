@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position, Viewpoint
-from mvcodec.synthesis.bands import run_in_bands
 from mvcodec.video.codec import Plane, Planes
+from mvcodec.workers import run_all, run_in_bands
 
 SPREAD = 205
 """1024ths of a squared cell; a camera at distance b counts 1 / (SPREAD + 1024 b^2)."""
@@ -86,7 +85,6 @@ def predicted_disparity(
     maps: Mapping[Position, IntMap],
     place: Position,
     range_px: tuple[float, float],
-    pool: Executor,
 ) -> IntMap:
     """Disparity at a place from the maps of cameras around it: moved there, put to the vote, filled."""
     from mvcodec.kernels.prediction_depth import UNKNOWN, fill, splat, vote
@@ -94,14 +92,10 @@ def predicted_disparity(
     cameras = sorted(maps)
     shape = next(iter(maps.values())).shape
     moved = np.empty((len(cameras), *shape), np.int32)
-    jobs = [
-        pool.submit(splat, maps[camera], *_shift(array, camera, place), out)
-        for camera, out in zip(cameras, moved, strict=True)
-    ]
-    for job in jobs:
-        job.result()
+    shifts = zip(*(_shift(array, camera, place) for camera in cameras), strict=True)
+    run_all(splat, [maps[camera] for camera in cameras], *shifts, moved)
     voted = np.empty(shape, np.int32)
-    run_in_bands(pool, shape[0], vote, moved, _weights(array, cameras, place), voted)
+    run_in_bands(shape[0], vote, moved, _weights(array, cameras, place), voted)
     # Whole numbers below 2^24 are exact in float32.
     found = cv2.medianBlur(voted.astype(np.float32), 3).astype(np.int32)
     assert np.float32(UNKNOWN) == UNKNOWN
@@ -114,7 +108,6 @@ def predict(
     sources: Sequence[PredictionSource],
     place: Position,
     disparity: IntMap,
-    pool: Executor,
 ) -> Planes:
     """The planes of a place, predicted from the sources that see each pixel.
 
@@ -132,11 +125,9 @@ def predict(
     y = np.empty((height, width), np.uint8)
     chroma = np.empty((2, height // 2, width // 2), np.uint8)
     luma_planes = np.stack([source.luma for source in ordered])
-    run_in_bands(pool, height, predict_luma, luma_planes, maps, shifts, weights, CUBIC, disparity, y)
+    run_in_bands(height, predict_luma, luma_planes, maps, shifts, weights, CUBIC, disparity, y)
     chroma_planes = np.stack([source.chroma for source in ordered])
-    run_in_bands(
-        pool, height // 2, predict_chroma, chroma_planes, maps, shifts, weights, LINEAR, disparity, chroma
-    )
+    run_in_bands(height // 2, predict_chroma, chroma_planes, maps, shifts, weights, LINEAR, disparity, chroma)
     return Planes(y, chroma[0], chroma[1])
 
 

@@ -17,8 +17,9 @@ import numpy as np
 
 from mvcodec.errors import SettingError, StreamError
 from mvcodec.video import libvpx
-from mvcodec.video.bits import BitReader, NalError
+from mvcodec.video.bits import NalError
 from mvcodec.video.codec import Planes
+from mvcodec.video.vp9_syntax import parse_frame
 
 MOST_REFERENCES = 2
 MAX_QUANTIZER = 63
@@ -137,11 +138,11 @@ class Vp9ReferenceDecoder:
             if start:
                 self._decoder = libvpx.Vp9Decoder(*self._size)
                 for number, grey in enumerate(start):
-                    check_frame(grey, self._size if number == 0 else None)
+                    _check(grey, self._size if number == 0 else None)
                     self._decoder.decode(grey)
             if self._decoder is None:
                 raise StreamError(label, "a picture that builds on one that is missing", "a keyframe")
-            check_frame(frame, None)
+            _check(frame, None)
             for place, prediction in zip(_PLACES, predictions, strict=False):
                 self._decoder.set_reference(place, _joined(prediction))
             return Planes(*self._decoder.decode(frame))
@@ -150,35 +151,22 @@ class Vp9ReferenceDecoder:
             raise StreamError(label, f"a damaged picture ({error})", "a VP9 frame") from None
 
 
-def check_frame(data: bytes, size: tuple[int, int] | None) -> None:
-    """Read a frame's uncompressed header (VP9 section 6.2): what would take memory is refused unseen.
+def _check(data: bytes, size: tuple[int, int] | None) -> None:
+    """Refuse unseen what would take memory, or is another frame than the encoder writes.
 
     Args:
         size: of the key frame that it must be; None: it must be an inter frame of its reference's size.
 
     Raises:
-        NalError: it is another frame than the encoder writes.
+        NalError: it is not.
     """
-    bits = BitReader(data)
-    if (bits.u(2), bits.u(2)) != (2, 0):
-        raise NalError("no frame of profile 0")
-    show_existing, inter, shown, resilient = (bits.u(1) for _ in range(4))
-    if show_existing or not shown or resilient or inter == (size is not None):
+    frame = parse_frame(data)
+    if frame.again or not frame.shown or frame.key != (size is not None):
         raise NalError("a frame of another kind")
-    if size is not None:
-        sync, space = bits.u(24), bits.u(3)
-        if sync != 0x498342 or space == 7:
-            raise NalError("a key frame that is not 4:2:0")
-        bits.u(1)
-        if (bits.u(16) + 1, bits.u(16) + 1) != size:
-            raise NalError("a picture of another size")
-        return
-    bits.u(2)  # reset_frame_context
-    bits.u(8)  # refresh_frame_flags
-    for _ in range(3):
-        bits.u(4)  # which reference, and its sign
-    if not any(bits.u(1) for _ in range(3)):
-        raise NalError("a picture of another size than its references'")
+    if frame.size != size:
+        raise NalError("a picture of another size")
+    if frame.sequence is not None and frame.sequence.unlike is not None:
+        raise NalError(f"a frame of {frame.sequence.unlike}")
 
 
 def _joined(planes: Planes) -> libvpx.Bytes:
