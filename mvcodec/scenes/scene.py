@@ -17,6 +17,7 @@ from mvcodec.scenes.lighting import LightBaker
 from mvcodec.scenes.renderer import LitScene, Matrix, Optics
 from mvcodec.scenes.room import FLOOR_FROM_M, FLOOR_M, LIGHTING, NEAREST_M, WALL_M, Room
 from mvcodec.scenes.solids import Vector
+from mvcodec.scenes.textures import photographs
 
 ROOM_FPS = 24.0
 # Of the whole rig, whatever its grid: 20 px of disparity between its ends at the wall, at a width of 640.
@@ -195,9 +196,7 @@ class MotorcycleScene:
     licence = "Middlebury 2014 stereo data (Scharstein et al., GCPR 2014), as in scikit-image"
 
     def __init__(self, settings: SceneSettings) -> None:
-        import skimage.data
-
-        load: Callable[[], tuple[Picture, Picture, FloatMap]] = skimage.data.stereo_motorcycle
+        load: Callable[[], tuple[Picture, Picture, FloatMap]] = photographs().stereo_motorcycle
         left, right, disparity = load()
         self.frame_count = 1
         self._pictures: dict[Position, Picture] = {(0, 0): left, (0, 1): right}

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mvcodec.errors import MissingExtra
 from mvcodec.frames import Picture
 
 PHOTOGRAPHS = (
@@ -31,16 +32,30 @@ PHOTOGRAPHS = (
 _LONGEST_PX = 640
 
 
+def photographs() -> Any:
+    """The module ``skimage.data``.
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    try:
+        import skimage.data
+    except ModuleNotFoundError:
+        raise MissingExtra("scikit-image", "scenes") from None
+    return skimage.data
+
+
 @cache
 def photograph(name: str) -> Picture:
     """A photograph as uint8 (H, W, 3) RGB, shrunk to 640 px at most; grey ones as three channels.
 
     Args:
         name: one of PHOTOGRAPHS.
-    """
-    import skimage.data
 
-    picture: NDArray[np.uint8] = getattr(skimage.data, name)()
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    picture: NDArray[np.uint8] = getattr(photographs(), name)()
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=2)
     scale = _LONGEST_PX / max(picture.shape[:2])
