@@ -19,8 +19,8 @@ from mcap.records import (
 )
 
 from mvcodec.conformance.data_section import DataSection
-from mvcodec.conformance.record_walk import RecordWalk
 from mvcodec.conformance.summary_check import check_summary
+from mvcodec.conformance.told_records import ToldRecords
 from mvcodec.container.file_index import FileIndex, read_index
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.records import (
@@ -77,7 +77,7 @@ class FileCheck:
     """
 
     def __init__(self, file: BinaryIO, limits: Limits = DEFAULT_LIMITS) -> None:
-        self._walk, self._limits = RecordWalk(file, limits), limits
+        self._walk, self._limits = ToldRecords(file, limits), limits
         self.findings = self._walk.findings
         self._tell, self._parsed = self._walk.tell, self._walk.parsed
         self.metadata: dict[str, dict[str, str]] = {}

@@ -9,13 +9,13 @@ from mcap.opcode import Opcode
 from mcap.records import DataEnd, Footer
 
 from mvcodec.conformance.data_section import SUMMARY_RECORDS, DataSection
-from mvcodec.conformance.record_walk import RecordWalk
+from mvcodec.conformance.told_records import ToldRecords
 from mvcodec.container.records import HEAD, MAGIC
 
 _CRC_BYTES = 4
 
 
-def check_summary(walk: RecordWalk, seen: DataSection, data_end: int, content: bytes) -> None:
+def check_summary(walk: ToldRecords, seen: DataSection, data_end: int, content: bytes) -> None:
     """Go on through the summary to the end of the file, and tell what is not as it must be.
 
     Args:
@@ -49,7 +49,7 @@ def check_summary(walk: RecordWalk, seen: DataSection, data_end: int, content: b
             walk.tell("summary", difference)
 
 
-def _check_footer(walk: RecordWalk, content: bytes, start: int, place: int) -> None:
+def _check_footer(walk: ToldRecords, content: bytes, start: int, place: int) -> None:
     footer = walk.parsed(Footer, content)
     if footer is None:
         return

@@ -16,6 +16,7 @@ from mvcodec.container.declared import Declared
 from mvcodec.container.exact_file import ExactFile
 from mvcodec.container.file_index import FileIndex, read_index
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.container.record_walk import RecordWalk
 from mvcodec.container.records import (
     DAMAGE,
     MAGIC,
@@ -174,36 +175,21 @@ class ChunkReader:
 
     def _streamed(self) -> Iterator[list[TopicMessage]]:
         self._start()
-        while True:
-            checksum = self._file.crc
-            try:
-                record = read_record(self._file, self._limits)
-            except CutOff as cut:
-                self._file.give_back(cut.content)
-                if cut.content and find_chunk(self._file, self._limits):
-                    self._report("a record that is longer than what follows")
-                    continue
-                if cut.opcode == Opcode.CHUNK and (messages := self._salvage(cut.content)):
-                    self.partial = True
-                    yield messages
-                self.cut_off = True
-                return
-            except RecordError as error:
-                self._report(str(error))
-                if not find_chunk(self._file, self._limits):
-                    return
-                continue
-            if record is None:
-                self.cut_off = True
-                return
+        walk = RecordWalk(self._file, self._limits, self._report)
+        while (record := walk.next()) is not None:
             opcode, content = record
             if opcode == Opcode.FOOTER:
                 self._end()
                 return
             if opcode == Opcode.DATA_END:
-                self._check_data(content, checksum)
+                self._check_data(content, walk.crc)
             elif messages := self._record(opcode, content):
                 yield messages
+        if walk.cut is not None:
+            if walk.cut.opcode == Opcode.CHUNK and (messages := self._salvage(walk.cut.content)):
+                self.partial = True
+                yield messages
+            self.cut_off = True
 
     def _start(self) -> None:
         magic = self._file.read(len(MAGIC))

@@ -1,4 +1,4 @@
-"""Reads an MCAP file record by record, and tells what is none."""
+"""The records of an MCAP file for `validate`, with findings about what is none."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from mcap.data_stream import ReadDataStream
 from mvcodec.conformance.finding import Finding, error
 from mvcodec.container.exact_file import ExactFile
 from mvcodec.container.limits import Limits
-from mvcodec.container.records import DAMAGE, CutOff, RecordError, find_chunk, read_record
+from mvcodec.container.record_walk import RecordWalk
+from mvcodec.container.records import DAMAGE
 
 
-class RecordWalk:
-    """Goes through the records of a seekable file.
+class ToldRecords:
+    """Goes through the records of a seekable file, and tells what is none.
 
     Attributes:
         file: where it is.
@@ -24,7 +25,8 @@ class RecordWalk:
     """
 
     def __init__(self, file: BinaryIO, limits: Limits) -> None:
-        self.file, self._limits = ExactFile(file), limits
+        self.file = ExactFile(file)
+        self._walk = RecordWalk(self.file, limits, self._tell_damage)
         self.findings: list[Finding] = []
         self.time_ns: int | None = None
         self.whole = True
@@ -35,27 +37,17 @@ class RecordWalk:
         self.findings.append(error(code, message, topic, time_ns))
 
     def next(self) -> tuple[int, bytes, int] | None:
-        """The next record and its place; None where there is none (which is told)."""
-        while True:
-            place = self.file.place
-            try:
-                record = read_record(self.file, self._limits)
-            except CutOff as cut:
-                self.file.give_back(cut.content)
-                if not (cut.content and find_chunk(self.file, self._limits)):
-                    self.tell("cut-off", "the file breaks off here")
-                    return None
-                self.tell("record", "a record that is longer than what follows")
-            except RecordError as damage:
-                self.tell("record", str(damage))
-                if not find_chunk(self.file, self._limits):
-                    return None
-            else:
-                if record is None:
-                    self.tell("cut-off", "the file breaks off here")
-                    return None
-                return record[0], record[1], place
-            self.whole = False
+        """The next record and where it begins; None where there is none (which is told)."""
+        record = self._walk.next()
+        if record is None:
+            if self._walk.cut is not None:
+                self.tell("cut-off", "the file breaks off here")
+            return None
+        return *record, self._walk.place
+
+    def _tell_damage(self, what: str) -> None:
+        self.tell("record", what)
+        self.whole = False
 
     def parsed(self, kind: Any, content: bytes) -> Any:
         """A record of the MCAP library's kind; None (told) where it is damaged."""
