@@ -13,7 +13,7 @@ WITHOUT = """
 import sys
 class Gone:
     def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in {"skimage", "scipy", "matplotlib", "bjontegaard", "foxglove", "fsspec"}:
+        if name.partition(".")[0] in {"skimage", "matplotlib", "bjontegaard", "foxglove", "fsspec"}:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 sys.meta_path.insert(0, Gone())
 from mvcodec.cli.main import main
