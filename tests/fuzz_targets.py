@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from mvcodec.capture.recording import Recording, RecordingSettings
+from mvcodec.capture.recording import Recording
+from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.conformance.file_check import FileCheck
 from mvcodec.conformance.unit_rules import UnitRules
 from mvcodec.container import McapReader

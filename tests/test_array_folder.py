@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 from array_files import make_folder, picture_of, rewrite, save, save_planes
 from numpy.typing import NDArray
+from PIL import Image
 
 from mvcodec.array import Calibration
 from mvcodec.capture import open_input, resolve_frames
+from mvcodec.capture.bit_depth import BitDepth
 from mvcodec.capture.picture_files import picture_size, read_picture
+from mvcodec.capture.reading import Reading
 from mvcodec.capture.truth import read_map, read_pfm
-from mvcodec.errors import InputError, SettingError
+from mvcodec.errors import InputError, MvCodecWarning, SettingError
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -132,10 +135,58 @@ def test_grey_picture_becomes_three_equal_channels(tmp_path: Path, suffix: str) 
         ("deep.tiff", (6, 7)),
     ],
 )
-def test_sixteen_bit_picture_is_refused(tmp_path: Path, name: str, shape: tuple[int, ...]) -> None:
-    save(tmp_path / name, np.full(shape, 9000, np.uint16))
-    with pytest.raises(InputError, match=rf"{name}: found (16|32) bits a channel, expected 8 bits"):
-        read_picture(tmp_path / name)
+def test_pictures_of_sixteen_bits_keep_their_levels(
+    tmp_path: Path, name: str, shape: tuple[int, ...]
+) -> None:
+    values = np.linspace(20000, 65535, 42).astype(np.uint16)
+    save(tmp_path / name, np.resize(values, shape))
+    expected = np.resize(np.round(values / 257), shape).reshape(6, 7, -1)
+    assert np.abs(read_picture(tmp_path / name).astype(int) - expected).max() <= 1
+
+
+@pytest.mark.parametrize("bits", [10, 12])
+def test_pictures_that_use_fewer_bits_than_they_have_are_not_black(tmp_path: Path, bits: int) -> None:
+    values = np.linspace(0, (1 << bits) - 1, 42).round().astype(np.uint16).reshape(6, 7)
+    save(tmp_path / "deep.png", values)
+    with pytest.warns(MvCodecWarning, match=rf"stay below {1 << bits}: taken as {bits} bits; --bits N"):
+        picture = read_picture(tmp_path / "deep.png")
+    assert np.abs(picture[..., 0] - values * (255 / ((1 << bits) - 1))).max() <= 0.51
+    stated = read_picture(tmp_path / "deep.png", depth=BitDepth("x", 16))
+    assert np.abs(stated[..., 0] - values / 257).max() <= 0.51
+    with pytest.raises(SettingError, match=r"--bits: found 7, expected 8\.\.16"):
+        BitDepth("x", 7)
+
+
+def test_all_cameras_of_an_array_have_one_depth(tmp_path: Path) -> None:
+    for col, brightest in enumerate((900, 4000)):
+        save(tmp_path / f"{col}.png", np.full((16, 24), brightest, np.uint16))
+    document = '{"rows": 1, "cols": 2, "views": [[["0.png"], ["1.png"]]]}'
+    (tmp_path / "array.json").write_text(document)
+    with pytest.warns(MvCodecWarning, match="taken as 12 bits"):
+        (item,) = open_input([tmp_path]).frame_sets()
+    assert [picture.max() for picture in item.pictures.values()] == [56, 249]
+
+
+def test_a_picture_is_turned_as_its_exif_says(tmp_path: Path) -> None:
+    image = Image.fromarray(picture_of((0, 0), 0))
+    exif = image.getexif()
+    exif[0x112] = 6
+    image.save(tmp_path / "turned.png", exif=exif)
+    assert picture_size(tmp_path / "turned.png") == (16, 24)
+    np.testing.assert_array_equal(read_picture(tmp_path / "turned.png"), np.rot90(np.array(image), 3))
+
+
+@pytest.mark.parametrize("damage", ["gone", "cut"])
+def test_unreadable_pictures_cost_their_frame_set_where_that_is_wanted(tmp_path: Path, damage: str) -> None:
+    folder = make_folder(tmp_path, 1, 2, 3)
+    path = folder / "cam" / "01_1.png"
+    path.unlink() if damage == "gone" else path.write_bytes(path.read_bytes()[:60])
+    told: list[InputError] = []
+    source = open_input([folder], reading=Reading(on_unreadable=told.append))
+    assert [item.index for item in source.frame_sets()] == [0, 2]
+    assert [error.source for error in told] == [str(path)]
+    with pytest.raises(InputError, match=r"01_1\.png"):
+        list(open_input([folder]).frame_sets())
 
 
 # Ground truth
@@ -231,9 +282,9 @@ def test_reading_is_one_frame_set_ahead_at_most(tmp_path: Path, monkeypatch: pyt
     source = open_input([make_folder(tmp_path, 1, 1, 6)])
     read: list[str] = []
 
-    def counting(path: Path, size: tuple[int, int] | None = None) -> Any:
+    def counting(path: Path, size: tuple[int, int], depth: BitDepth) -> Any:
         read.append(path.name)
-        return read_picture(path, size)
+        return read_picture(path, size, depth)
 
     monkeypatch.setattr("mvcodec.capture.view_array.read_picture", counting)
     sets = source.frame_sets()

@@ -18,7 +18,8 @@ from command_line import COMMAND, fails, mvcodec, succeeds
 from recordings import ARRAY, GRID, START_NS, recording, shots
 from small_arrays import write_array
 
-from mvcodec.capture.recording import Recording, RecordingSettings
+from mvcodec.capture.recording import Recording
+from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.conformance.validation import validate
 from mvcodec.container import McapReader, McapWriter, read_info
 from mvcodec.container.declared import DROPPED_KEY

@@ -21,7 +21,8 @@ from recordings import ARRAY, GRID, START_NS, recording, shots
 
 from mvcodec.array import Calibration, Position
 from mvcodec.capture.recorded_calibration import NotRectified, array_calibration
-from mvcodec.capture.recording import Recording, RecordingSettings
+from mvcodec.capture.recording import Recording
+from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.container import McapReader
 from mvcodec.container.recorded_rig import RecordedRig
 
@@ -72,7 +73,7 @@ def make_rig(*, places: bool = True) -> Rig:
 def taken(rig: Rig, size: tuple[int, int] = SIZE) -> tuple[Calibration, float] | None:
     found = RecordedRig()
     for message in rig.values():
-        found.push(message.DESCRIPTOR.full_name, message.SerializeToString())
+        found.push(message.DESCRIPTOR.full_name, "protobuf", message.SerializeToString())
     return array_calibration(found, {camera: frame_of(camera) for camera in ARRAY.real}, size)
 
 

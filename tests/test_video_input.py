@@ -163,5 +163,5 @@ def test_a_file_that_ends_early_says_so(tmp_path: Path) -> None:
     (path,) = write_grid(tmp_path, 1, 4)
     view = VideoView(path)
     view.count = 9
-    with pytest.raises(InputError, match=r"cam0\.mp4: found no frame 4, expected 9 frames"):
+    with pytest.raises(InputError, match=r"cam0\.mp4: found no whole picture 4, .*, expected 9 pictures"):
         list(view.pictures(range(9)))

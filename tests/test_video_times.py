@@ -146,7 +146,7 @@ def test_pictures_before_the_first_keyframe_are_not_there(tmp_path: Path, cut: i
                 out.mux(packet)
     array, told = opened(full, tmp_path / "late.mkv")
     assert numbers(array) == [[n, n] for n in range(10, 20)]
-    assert f"late.mkv: {10 - cut} frames are left out, since they come before the first keyframe" in told[0]
+    assert f"late.mkv: {10 - cut} pictures are left out: a video before its first keyframe" in told[0]
 
 
 def test_edit_lists_count(tmp_path: Path) -> None:

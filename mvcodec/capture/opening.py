@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from mvcodec.array import Calibration, CameraArray, Position
+from mvcodec.capture.bit_depth import BitDepth
 from mvcodec.capture.manifest import DEFAULT_FPS, MANIFEST_NAME, Manifest, ViewFiles, read_manifest
+from mvcodec.capture.reading import Reading
 from mvcodec.capture.selection import select_real
 from mvcodec.capture.shared_clock import StatedTimes, common_times
 from mvcodec.capture.source import ArraySource
@@ -27,6 +29,7 @@ def open_input(
     grid: tuple[int, int] | None = None,
     real: str = "corners",
     timing: Timing | None = None,
+    reading: Reading | None = None,
 ) -> ArraySource:
     """Open an input; of pictures the headers are read, of videos the packets and the first frame.
 
@@ -37,30 +40,34 @@ def open_input(
         grid: (rows, cols); needed for video files, must agree with an array folder.
         real: which cameras are real: ``corners``, ``all``, ``every:K`` or ``R,R..xC,C..``.
         timing: what is known better than the files say.
+        reading: how pictures are read, and what happens to unreadable ones.
 
     Raises:
         SettingError: `grid`, `real` or `timing` doesn't fit the input.
         InputError: something is missing, unreadable, malformed, the views differ in size, or have
             no time in common.
     """
-    timing = timing or Timing()
+    timing, reading = timing or Timing(), reading or Reading()
     if not paths:
         raise SettingError("INPUT", "nothing", "an array folder, or video files and --grid RxC")
     for path in paths:
         if not path.exists():
             raise InputError(path, "nothing there", "an array folder or a video file")
     if len(paths) == 1 and (paths[0].is_dir() or paths[0].suffix.lower() == ".json"):
-        return _open_folder(paths[0], grid, real, timing)
-    return _open_videos(paths, grid, real, timing)
+        return _open_folder(paths[0], grid, real, timing, reading)
+    return _open_videos(paths, grid, real, timing, reading)
 
 
-def _open_folder(path: Path, grid: tuple[int, int] | None, real: str, timing: Timing) -> ViewArray:
+def _open_folder(
+    path: Path, grid: tuple[int, int] | None, real: str, timing: Timing, reading: Reading
+) -> ViewArray:
     manifest = read_manifest(_find_manifest(path))
     if grid not in (None, (manifest.rows, manifest.cols)):
         raise SettingError(
             "--grid", _grid_text(grid), f"{manifest.rows}x{manifest.cols} as {manifest.path} says"
         )
-    views = _open_views(manifest.views, _open_view)
+    depth = BitDepth(str(path), reading.bits)
+    views = _open_views(manifest.views, lambda files: _open_view(files, depth))
     stated = StatedTimes(manifest.path, manifest.fps, manifest.times_ns, manifest.first_frame)
     fps, pairing = common_times(str(path), views, stated, timing, DEFAULT_FPS)
     array = _folder_array(manifest, views[0, 0].size, fps, real)
@@ -74,6 +81,7 @@ def _open_folder(path: Path, grid: tuple[int, int] | None, real: str, timing: Ti
         array,
         views,
         pairing,
+        on_unreadable=reading.on_unreadable,
         truth=manifest.truth,
         first_frame=manifest.first_frame,
         listed_real=manifest.real,
@@ -115,7 +123,9 @@ def _folder_array(manifest: Manifest, size: tuple[int, int], fps: float, real: s
         raise InputError(manifest.path, f"{error.setting} = {error.found}", error.expected) from None
 
 
-def _open_videos(paths: Sequence[Path], grid: tuple[int, int] | None, real: str, timing: Timing) -> ViewArray:
+def _open_videos(
+    paths: Sequence[Path], grid: tuple[int, int] | None, real: str, timing: Timing, reading: Reading
+) -> ViewArray:
     for path in paths:
         if path.is_dir():
             raise InputError(path, "a folder among several inputs", "video files only, or one array folder")
@@ -143,7 +153,7 @@ def _open_videos(paths: Sequence[Path], grid: tuple[int, int] | None, real: str,
         calibration,
         name=first.path.resolve().parent.name,
     )
-    return ViewArray(name, array, views, pairing)
+    return ViewArray(name, array, views, pairing, on_unreadable=reading.on_unreadable)
 
 
 def _open_views(
@@ -157,8 +167,8 @@ def _open_views(
     return views
 
 
-def _open_view(files: ViewFiles) -> ViewReader:
-    return VideoView(files) if isinstance(files, Path) else PictureView(files)
+def _open_view(files: ViewFiles, depth: BitDepth) -> ViewReader:
+    return VideoView(files) if isinstance(files, Path) else PictureView(files, depth)
 
 
 def _grid_text(grid: tuple[int, int] | None) -> str:

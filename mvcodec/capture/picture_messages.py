@@ -1,118 +1,108 @@
-"""Messages with pictures -> RGB, as their tags and formats say."""
+"""Messages with still pictures -> RGB, as their tags and formats say."""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable
+import warnings
 
-import av
 import numpy as np
-from av.codec.context import Flags
-from av.error import FFmpegError
-from av.video.codeccontext import VideoCodecContext
-from av.video.reformatter import VideoReformatter
-from PIL import Image, UnidentifiedImageError
 
-from mvcodec.capture.video_input import frame_to_rgb
+from mvcodec.capture.bit_depth import BitDepth, DeepPixels
+from mvcodec.capture.raw_pixels import RAW_ENCODINGS, Pixels, RawEncoding
+from mvcodec.capture.still_pictures import (
+    UnreadablePicture,
+    deep_pixels,
+    is_see_through,
+    opened_still,
+    still_facts,
+    still_to_rgb,
+)
 from mvcodec.container.recorded_pictures import RecordedPicture
-from mvcodec.errors import InputError
+from mvcodec.errors import InputError, MvCodecWarning
 from mvcodec.frames import Picture
-from mvcodec.video.codecs import CODECS
 
 MAX_PIXELS = 1 << 26
 """The largest picture that is taken: twice 8K."""
 
-_DECODERS = {codec.foxglove: codec.library for codec in CODECS.values()}
-_COMPRESSED = ("JPEG", "PNG", "WEBP")
-_UNREADABLE = (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError)
-"""What Pillow raises on damaged pictures."""
+_COMPRESSED = "JPEG, PNG, WEBP, TIFF or BMP"
 
 
-class PictureDecoder:
-    """Decodes the messages of one topic, which must all come in order.
+class StillDecoder:
+    """Decodes the still pictures of one topic, coded and raw ones.
 
     Args:
         name: of the recording, for messages.
+        depth: of the whole recording.
     """
 
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._context: VideoCodecContext | None = None
-        self._format = ""
-        self._reformatter = VideoReformatter()
+    def __init__(self, name: str, depth: BitDepth) -> None:
+        self._name, self._depth, self._told_alpha = name, depth, False
 
-    def push(self, message: RecordedPicture) -> Picture | None:
-        """uint8 (H, W, 3) RGB; None where a video has not come to its first keyframe yet.
+    def look(self, message: RecordedPicture) -> None:
+        """Take a picture into account for the depth of the recording; what is wrong with it is told later."""
+        if message.kind == "video":
+            return
+        try:
+            pixels = deep_pixels(message.data) if message.kind == "image" else self._deep_raw(message)
+        except (UnreadablePicture, InputError):
+            return
+        if pixels is not None:
+            self._depth.look(pixels)
+
+    def decode(self, message: RecordedPicture) -> Picture:
+        """uint8 (H, W, 3) RGB.
 
         Raises:
             InputError: damaged, too large, or of a format that mvcodec doesn't know.
         """
-        if message.schema == "foxglove.CompressedVideo":
-            return self._video(message)
-        if message.schema == "foxglove.CompressedImage":
-            return self._image(message)
-        return self._raw(message)
-
-    def _error(self, message: RecordedPicture, found: str, expected: str) -> InputError:
-        return InputError(f"{self._name}: {message.label}", found, expected)
-
-    def _video(self, message: RecordedPicture) -> Picture | None:
-        if message.format not in _DECODERS:
-            raise self._error(message, f"video of format {message.format!r}", ", ".join(_DECODERS))
-        if self._context is None or self._format != message.format:
-            self._format = message.format
-            context = av.CodecContext.create(_DECODERS[message.format], "r")
-            assert isinstance(context, VideoCodecContext)
-            context.thread_count = 1
-            context.flags |= Flags.low_delay
-            context.options = {"max_pixels": str(MAX_PIXELS)}
-            self._context = context
-        try:
-            frames = self._context.decode(av.Packet(message.data)) if message.data else []
-        except FFmpegError:
-            return None  # before the first keyframe there is nothing to build on
-        if not frames or frames[-1].is_corrupt:
-            return None
-        return frame_to_rgb(frames[-1], self._reformatter)
+        return self._image(message) if message.kind == "image" else self._raw(message)
 
     def _image(self, message: RecordedPicture) -> Picture:
         try:
-            with Image.open(io.BytesIO(message.data), formats=_COMPRESSED) as picture:
+            with opened_still(message.data) as picture:
                 if picture.width * picture.height > MAX_PIXELS:
                     found = f"a picture of {picture.width}x{picture.height}"
                     raise self._error(message, found, f"at most {MAX_PIXELS} px")
-                return np.array(picture.convert("RGB"), np.uint8)
-        except (
-            UnidentifiedImageError,
-            OSError,
-            ValueError,
-            SyntaxError,
-            Image.DecompressionBombError,
-        ) as error:
-            found = f"an unreadable {message.format or 'picture'} ({' '.join(str(error).split())})"
-            raise self._error(message, found, ", ".join(_COMPRESSED)) from None
+                if not self._told_alpha and still_facts(picture).alpha and is_see_through(picture):
+                    self._tell_alpha(message)
+                return still_to_rgb(picture, message.data, self._depth)
+        except UnreadablePicture as error:
+            raise self._error(message, f"{error} in format {message.format!r}", _COMPRESSED) from None
 
     def _raw(self, message: RecordedPicture) -> Picture:
+        encoding, rows = self._rows(message)
+        if encoding.alpha and rows[..., -1].min() < np.iinfo(rows.dtype).max:
+            self._tell_alpha(message)
+        return encoding.convert(self._depth.scale(rows) if encoding.deep else rows)
+
+    def _deep_raw(self, message: RecordedPicture) -> DeepPixels | None:
+        encoding, rows = self._rows(message)
+        return rows if encoding.deep else None
+
+    def _rows(self, message: RecordedPicture) -> tuple[RawEncoding, Pixels]:
         assert message.layout is not None
         width, height, step = message.layout
-        if message.format not in _RAW:
-            raise self._error(message, f"raw pixels of encoding {message.format!r}", ", ".join(_RAW))
-        channels, convert = _RAW[message.format]
-        if not (width and height and width * height <= MAX_PIXELS and step >= width * channels):
+        if message.format not in RAW_ENCODINGS:
+            found = f"raw pixels of encoding {message.format!r}, which is not supported"
+            raise self._error(message, found, ", ".join(RAW_ENCODINGS))
+        encoding = RAW_ENCODINGS[message.format]
+        used = width * encoding.channels * (2 if encoding.deep else 1)
+        if not (width and height and width * height <= MAX_PIXELS and step >= used):
             raise self._error(message, f"{width}x{height} px in rows of {step} bytes", "a picture's layout")
-        if len(message.data) < step * height:
+        # The last row of some senders lacks its padding.
+        if len(message.data) < step * (height - 1) + used:
             raise self._error(message, f"{len(message.data)} bytes", f"{step * height}")
-        rows = np.frombuffer(message.data, np.uint8, step * height).reshape(height, step)
-        return convert(rows[:, : width * channels].reshape(height, width, channels))
+        data = np.frombuffer(message.data, np.uint8, min(len(message.data), step * height))
+        padded = np.pad(data, (0, step * height - len(data))).reshape(height, step)[:, :used]
+        values: Pixels = np.ascontiguousarray(padded)
+        if encoding.deep:
+            values = values.view(">u2" if message.big_endian else "<u2").astype(np.uint16)
+        return encoding, values.reshape(height, width, encoding.channels)
 
+    def _tell_alpha(self, message: RecordedPicture) -> None:
+        if not self._told_alpha:
+            self._told_alpha = True
+            text = f"{self._name}: {message.topic}: how opaque its pixels are is left out"
+            warnings.warn(text, MvCodecWarning, stacklevel=4)
 
-_RAW: dict[str, tuple[int, Callable[[Picture], Picture]]] = {
-    "rgb8": (3, np.ascontiguousarray),
-    "bgr8": (3, lambda pixels: np.ascontiguousarray(pixels[..., ::-1])),
-    "8UC3": (3, lambda pixels: np.ascontiguousarray(pixels[..., ::-1])),
-    "rgba8": (4, lambda pixels: np.ascontiguousarray(pixels[..., :3])),
-    "bgra8": (4, lambda pixels: np.ascontiguousarray(pixels[..., 2::-1])),
-    "mono8": (1, lambda pixels: np.repeat(pixels, 3, axis=2)),
-    "8UC1": (1, lambda pixels: np.repeat(pixels, 3, axis=2)),
-}
-"""Encoding of foxglove.RawImage -> channels, and what makes RGB of them."""
+    def _error(self, message: RecordedPicture, found: str, expected: str) -> InputError:
+        return InputError(f"{self._name}: {message.label}", found, expected)

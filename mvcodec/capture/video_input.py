@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import cast
@@ -19,6 +20,7 @@ from av.video.stream import VideoStream
 
 from mvcodec.capture.orientation import UPRIGHT, Orientation, matrix_orientation
 from mvcodec.capture.picture_files import wrong_size
+from mvcodec.capture.reading import OnUnreadable
 from mvcodec.capture.video_times import read_times
 from mvcodec.errors import InputError
 from mvcodec.frames import Picture
@@ -40,6 +42,8 @@ _MATRICES = {
     9: Colorspace.BT2020,
 }
 _FIRST_HD_HEIGHT = 720
+_HDR = {16: "PQ", 18: "HLG"}
+"""ITU-T H.273 TransferCharacteristics of high dynamic range."""
 
 
 class VideoView:
@@ -48,7 +52,7 @@ class VideoView:
     Attributes:
         path: the file.
         size: (width, height) as shown, px.
-        count: frames that can be shown, by the packets and edit lists.
+        count: whole frames that are shown, by the packets and edit lists.
         times_ns: when they are shown, ascending; None where the file has no times.
         fps: its frame rate; 0 where nothing says so.
         notes: what is unusual about it, one line each.
@@ -73,39 +77,56 @@ class VideoView:
         self._coded_size = first.width, first.height
         self._orientation, self.notes = _orientation(first)
         self.size = self._orientation.size(*self._coded_size)
-        if times.late:
-            self.notes += (f"{times.late} frames are left out, since they come before the first keyframe",)
+        self.notes += unusual(first)
+        self.notes += tuple(f"{count} pictures are left out: {why}" for why, count in times.left_out.items())
 
     def pictures(self, frames: Sequence[int]) -> Iterator[Picture]:
-        """uint8 (H, W, 3) RGB of some frames, decoded as they are asked for.
-
-        Args:
-            frames: their numbers, ascending.
+        """uint8 (H, W, 3) RGB of the frames of these numbers, which ascend, decoded as they are asked for.
 
         Raises:
             InputError: damaged, shorter than its packets say, or changing its size.
         """
-        given = 0
+        for picture in self.readable(frames, None):
+            assert picture is not None
+            yield picture
+
+    def readable(self, frames: Sequence[int], on_unreadable: OnUnreadable | None) -> Iterator[Picture | None]:
+        """See ViewReader."""
+        wanted = deque(frames)
+        if not wanted:
+            return
+        reformatter = VideoReformatter()
         try:
             with _opened(self.path) as container:
                 stream = _video_stream(container, self.path)
                 # The views are decoded side by side; threads within one would only compete.
                 stream.codec_context.thread_count = 1
-                reformatter = VideoReformatter()
-                for number, frame in self._numbered(container.decode(stream)):
-                    if given < len(frames) and number > frames[given]:
-                        break
-                    if given < len(frames) and number == frames[given]:
+                for number, frame in self._numbered(_decoded(container, stream)):
+                    while wanted and wanted[0] < number:
+                        self._tell_unreadable(wanted.popleft(), on_unreadable)
+                        yield None
+                    if wanted and wanted[0] == number:
                         if (frame.width, frame.height) != self._coded_size:
                             raise wrong_size(self.path, (frame.width, frame.height), self._coded_size)
+                        wanted.popleft()
                         yield self._orientation.apply(frame_to_rgb(frame, reformatter))
-                        given += 1
-                    if given == len(frames):
+                    if not wanted:
                         return
         except (av.error.FFmpegError, OSError) as error:
             raise _unreadable(self.path, error) from None
-        if given < len(frames):
-            raise InputError(self.path, f"no frame {frames[given]}", f"{self.count} frames")
+        while wanted:
+            self._tell_unreadable(wanted.popleft(), on_unreadable)
+            yield None
+
+    def _tell_unreadable(self, number: int, on_unreadable: OnUnreadable | None) -> None:
+        """Tell of a frame that the decoder did not give; raise it where nobody wants to know."""
+        known = self.times_ns is not None and number < len(self.times_ns)
+        where = f" at {self.times_ns[number] / 1e9:.3f} s" if known and self.times_ns else ""
+        found = f"no whole picture {number}{where}, the file is damaged there"
+        error = InputError(self.path, found, f"{self.count} pictures")
+        if on_unreadable is None:
+            raise error
+        on_unreadable(error)
 
     def _numbered(self, frames: Iterator[VideoFrame]) -> Iterator[tuple[int, VideoFrame]]:
         """Decoded frames with their numbers; without those that are left out."""
@@ -118,13 +139,47 @@ class VideoView:
                 yield numbers[frame.pts], frame
 
 
+def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
+    """The whole pictures: a damaged one, and what builds on it, is left out."""
+    lost = False
+    for packet in container.demux(stream):
+        try:
+            frames = packet.decode()
+        except av.error.EOFError:
+            return
+        except av.error.FFmpegError:
+            lost = True
+            continue
+        for frame in frames:
+            lost = frame.is_corrupt or (lost and not frame.key_frame)
+            if not lost:
+                yield frame
+
+
+def unusual(frame: VideoFrame) -> tuple[str, ...]:
+    """What is done to pictures like this one that their owner should know, one line each."""
+    notes = []
+    if any(component.is_alpha for component in frame.format.components):
+        notes.append("how opaque its pixels are is left out")
+    if frame.interlaced_frame:
+        notes.append("its pictures are interlaced: lines of two moments are mixed; deinterlace it first")
+    transfer = int(frame.color_trc)
+    if transfer in _HDR:
+        notes.append(
+            f"its brightness is coded for HDR ({_HDR[transfer]}) and taken as it is: pictures look pale;"
+            " convert it to BT.709 first"
+        )
+    return tuple(notes)
+
+
 def frame_to_rgb(frame: VideoFrame, reformatter: VideoReformatter) -> Picture:
     """uint8 (H, W, 3) RGB of a decoded frame, by its own matrix and range tags.
 
-    Untagged frames count as BT.709 from 720 lines on, as BT.601 below, limited range.
+    Untagged frames count as BT.709 from 720 lines on, as BT.601 below, limited range; grey ones as full.
     """
     guess = Colorspace.ITU709 if frame.height >= _FIRST_HD_HEIGHT else Colorspace.ITU601
     full = frame.color_range == ColorRange.JPEG or frame.format.name.startswith("yuvj")
+    full |= frame.color_range == ColorRange.UNSPECIFIED and frame.format.name.startswith(("gray", "ya"))
     rgb = reformatter.reformat(
         frame,
         format="rgb24",

@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Protocol
 
 from mvcodec.array import CameraArray, Position
+from mvcodec.capture.bit_depth import BitDepth
 from mvcodec.capture.pairing import Pairing
-from mvcodec.capture.picture_files import picture_size, read_picture, wrong_size
+from mvcodec.capture.picture_files import look_at_depth, picture_facts, read_picture, wrong_size
+from mvcodec.capture.reading import OnUnreadable
 from mvcodec.capture.source import resolve_frames
 from mvcodec.capture.truth import TruthFiles
-from mvcodec.errors import SettingError
+from mvcodec.errors import InputError, SettingError
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.workers import Job, settle, submit
 
@@ -38,30 +40,48 @@ class ViewReader(Protocol):
         """What is unusual about the files, one line each."""
         ...
 
-    def pictures(self, frames: Sequence[int]) -> Iterator[Picture]:
-        """uint8 (H, W, 3) RGB of the frames of these numbers, which ascend, read as they are asked for."""
+    def readable(self, frames: Sequence[int], on_unreadable: OnUnreadable | None) -> Iterator[Picture | None]:
+        """uint8 (H, W, 3) RGB of the frames of these numbers, which ascend, read as they are asked for.
+
+        Args:
+            on_unreadable: told of those that cannot be read, which are None; None: that is raised.
+        """
         ...
 
 
 class PictureView:
     """A view whose frames are picture files.
 
+    Args:
+        depth: of the whole input.
+
     Raises:
         InputError: the first one is missing or unreadable.
     """
 
-    def __init__(self, paths: tuple[Path, ...]) -> None:
-        self._paths = paths
+    def __init__(self, paths: tuple[Path, ...], depth: BitDepth) -> None:
+        self._paths, self._depth = paths, depth
         self.path = paths[0]
         self.count = len(paths)
         self.times_ns: tuple[int, ...] | None = None
-        self.notes: tuple[str, ...] = ()
-        self.size = picture_size(paths[0])
+        facts = picture_facts(paths[0])
+        self.size = facts.size
+        self.notes = ("how opaque its pixels are is left out",) if facts.alpha else ()
+        if facts.bits > 8:
+            look_at_depth(paths[0], depth)
 
-    def pictures(self, frames: Sequence[int]) -> Iterator[Picture]:
+    def readable(self, frames: Sequence[int], on_unreadable: OnUnreadable | None) -> Iterator[Picture | None]:
         """See ViewReader; every picture must have the size of the first one."""
         for frame in frames:
-            yield read_picture(self._paths[frame], self.size)
+            try:
+                picture = read_picture(self._paths[frame], self.size, self._depth)
+            except InputError as error:
+                if on_unreadable is None:
+                    raise
+                on_unreadable(error)
+                yield None
+            else:
+                yield picture
 
 
 class ViewArray:
@@ -72,6 +92,7 @@ class ViewArray:
         array: geometry and real cameras.
         views: a reader for every grid position, all of the same size (see `check_sizes`).
         pairing: which of their pictures belong together.
+        on_unreadable: told of a picture that cannot be read, whose frame set is left out; None: it is raised.
         truth: ground truth by view.
         first_frame, listed_real: as in ArraySource.
     """
@@ -83,6 +104,7 @@ class ViewArray:
         views: Mapping[Position, ViewReader],
         pairing: Pairing,
         *,
+        on_unreadable: OnUnreadable | None = None,
         truth: Mapping[Position, TruthFiles] | None = None,
         first_frame: int = 0,
         listed_real: tuple[Position, ...] | None = None,
@@ -91,6 +113,7 @@ class ViewArray:
         self.first_frame, self.listed_real = first_frame, listed_real
         self.frame_count = len(pairing.times_ns)
         self._views, self._pairing, self._truth = views, pairing, dict(truth or {})
+        self._on_unreadable = on_unreadable
 
     def frame_sets(
         self, frames: slice | None = None, views: Collection[Position] | None = None
@@ -106,11 +129,13 @@ class ViewArray:
 
     def _read(self, numbers: range, positions: tuple[Position, ...]) -> Iterator[FrameSet]:
         streams = {
-            position: self._views[position].pictures([self._pairing.numbers[position][n] for n in numbers])
+            position: self._views[position].readable(
+                [self._pairing.numbers[position][n] for n in numbers], self._on_unreadable
+            )
             for position in positions
         }
 
-        def start() -> dict[Position, Job[Picture]]:
+        def start() -> dict[Position, Job[Picture | None]]:
             return {position: submit(next, stream) for position, stream in streams.items()}
 
         ahead = start()
@@ -119,10 +144,12 @@ class ViewArray:
                 # A view's pictures are read one after the other: its stream is finished with
                 # this frame before it is asked for the next.
                 settle(ahead.values())
-                pictures = {position: job.result() for position, job in ahead.items()}
+                found = {position: job.result() for position, job in ahead.items()}
                 if number + 1 in numbers:
                     ahead = start()
-                yield FrameSet(self.first_frame + number, self._pairing.times_ns[number], pictures)
+                pictures = {position: picture for position, picture in found.items() if picture is not None}
+                if len(pictures) == len(found):
+                    yield FrameSet(self.first_frame + number, self._pairing.times_ns[number], pictures)
         finally:
             for job in ahead.values():
                 job.cancel()

@@ -27,6 +27,7 @@ from mvcodec.cli.info import document, summary
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_view_option import add_live_view, live_view
 from mvcodec.cli.paths import check_file_target, local_path
+from mvcodec.cli.picture_options import add_picture_options, reading_of
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_chunk_ms
 from mvcodec.cli.segment_options import add_segment, check_continues, plan
@@ -69,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_chunk_ms(parser)
     add_live_view(parser)
     add_time_options(parser)
+    add_picture_options(parser)
     add_stream_arguments(parser)
     add_segment(parser)
     add_frames(parser, "frames of the input to code")
@@ -112,7 +114,11 @@ def _check_effect(arguments: argparse.Namespace) -> None:
 
 def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
     source = open_input(
-        arguments.input, grid=arguments.grid, real=arguments.real, timing=timing_of(arguments)
+        arguments.input,
+        grid=arguments.grid,
+        real=arguments.real,
+        timing=timing_of(arguments),
+        reading=reading_of(arguments),
     )
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     array = source.array

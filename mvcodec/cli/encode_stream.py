@@ -5,34 +5,38 @@ from __future__ import annotations
 import argparse
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, get_args
 
 from mvcodec.array import CameraArray
 from mvcodec.capture.manifest import read_calibration
-from mvcodec.capture.recording import Recording, RecordingSettings
+from mvcodec.capture.recording import Recording
+from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_view_option import live_view
+from mvcodec.cli.picture_options import reading_of
 from mvcodec.cli.progress import progress
-from mvcodec.cli.safety import add_on_error
 from mvcodec.cli.standard_streams import INPUT_NAME, STANDARD, standard_input, standard_output
 from mvcodec.cli.tallied_writer import TalliedWriter
+from mvcodec.cli.time_options import timing_of
 from mvcodec.container import McapWriter
 from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.declared import DROPPED_KEY
+from mvcodec.container.recorded_pictures import Clock
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.live import LiveEncoding, WhenBehind
-from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError, StreamError
+from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet
 from mvcodec.output.live_view import LiveView
 
 SUFFIX = ".mcap"
 
-STREAM_OPTIONS = ("--topics", "--when-behind", "--on-error")
+STREAM_OPTIONS = ("--topics", "--when-behind", "--clock")
 DEFAULT_WHEN_BEHIND: WhenBehind = "block"
+DEFAULT_CLOCK: Clock = "stamp"
 
 
 class Unfinished(MvCodecError):
@@ -53,15 +57,20 @@ def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
         help="where coding or the reader of OUT is too slow: leave frame sets out, or let INPUT wait"
         f" (default: {DEFAULT_WHEN_BEHIND})",
     )
-    add_on_error(parser, "stop")
-    # What is given is told from what is not, so that it can be refused where it has no effect.
-    parser.set_defaults(on_error=None)
+    group.add_argument(
+        "--clock",
+        choices=get_args(Clock),
+        help="the times that count: the messages' own stamps, or when they were written down"
+        f" (default: {DEFAULT_CLOCK})",
+    )
 
 
 def is_stream(arguments: argparse.Namespace) -> bool:
-    """Whether the input is a recording or a stream."""
+    """Whether the input is a recording (in one file or several) or a stream."""
     inputs: list[Path] = arguments.input
-    return len(inputs) == 1 and (str(inputs[0]) == STANDARD or inputs[0].suffix.lower() == SUFFIX)
+    return [str(path) for path in inputs] == [STANDARD] or all(
+        path.suffix.lower() == SUFFIX for path in inputs
+    )
 
 
 def refuse_stream_options(arguments: argparse.Namespace) -> None:
@@ -130,24 +139,33 @@ def _run(
 
 @contextmanager
 def _opened(arguments: argparse.Namespace) -> Iterator[Recording]:
+    timing = timing_of(arguments)
     settings = RecordingSettings(
         topics=_topic_grid(arguments),
         real=arguments.real,
-        fps=arguments.fps,
-        tolerance_ms=arguments.tolerance_ms,
+        fps=timing.fps,
+        tolerance_ms=timing.tolerance_ms,
         calibration=None if arguments.calibration is None else read_calibration(arguments.calibration),
+        clock=arguments.clock or DEFAULT_CLOCK,
+        offsets_ms=timing.offsets_ms,
+        bits=arguments.bits,
     )
-    path: Path = arguments.input[0]
-    on_damage = _warn if arguments.on_error == "skip" else None
-    if str(path) == STANDARD:
+    on_damage = reading_of(arguments).on_unreadable
+    paths: list[Path] = arguments.input
+    if str(paths[0]) == STANDARD:
         yield Recording(standard_input(), INPUT_NAME, settings, on_damage=on_damage)
         return
+    name = str(paths[0]) if len(paths) == 1 else f"{paths[0]} ... {paths[-1]}"
+    with ExitStack() as files:
+        parts = [files.enter_context(_binary(path)) for path in paths]
+        yield Recording(parts, name, settings, on_damage=on_damage)
+
+
+def _binary(path: Path) -> BinaryIO:
     try:
-        file: BinaryIO = path.open("rb")
+        return path.open("rb")
     except OSError as error:
         raise InputError(path, error.strerror, "a file that can be read") from None
-    with file:
-        yield Recording(file, str(path), settings, on_damage=on_damage)
 
 
 def _topic_grid(arguments: argparse.Namespace) -> tuple[tuple[str, ...], ...]:
@@ -178,7 +196,3 @@ def _frames(frames: slice | None) -> tuple[int, int | None]:
             "--frames", text, "A:B counted from the start, since the input's length is unknown"
         )
     return start, stop
-
-
-def _warn(error: StreamError) -> None:
-    warnings.warn(str(error), MvCodecWarning, stacklevel=3)

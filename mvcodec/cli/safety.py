@@ -38,13 +38,17 @@ def limits_of(arguments: argparse.Namespace) -> Limits:
     return Limits(**dict(arguments.limit))
 
 
-def add_on_error(parser: argparse.ArgumentParser, default: str) -> None:
+def add_on_error(
+    parser: argparse.ArgumentParser,
+    default: str,
+    what: str = "at damage: go on with the next keyframe, or stop",
+) -> None:
     """``--on-error skip|stop``."""
     parser.add_argument(
         "--on-error",
         choices=("skip", "stop"),
         default=default,
-        help=f"at damage: go on with the next keyframe, or stop (default: {default})",
+        help=f"{what} (default: {default})",
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from bisect import bisect_left
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
 from typing import BinaryIO
 
@@ -24,6 +24,7 @@ from mvcodec.container.records import (
     CutOff,
     FramingError,
     RecordError,
+    UnknownPacking,
     chunk_records,
     find_chunk,
     parse_channel,
@@ -36,6 +37,7 @@ from mvcodec.container.records import (
 from mvcodec.errors import StreamError
 
 EXPECTED = "an MCAP file written by mvcodec"
+PACKINGS_READ = "zstd, lz4 or none: other packings are not supported"
 
 TopicMessage = tuple[str, Message]
 OnDamage = Callable[[StreamError], None]
@@ -49,6 +51,7 @@ class ChunkReader:
         name: what to call it in messages.
         limits: what is more than that is refused.
         on_damage: told of damage, behind which reading goes on; None raises it.
+        expected: what the file should be, for messages.
 
     Attributes:
         cut_off: the input broke off (known when `chunks` has ended).
@@ -64,8 +67,9 @@ class ChunkReader:
         name: str,
         limits: Limits = DEFAULT_LIMITS,
         on_damage: OnDamage | None = None,
+        expected: str = EXPECTED,
     ) -> None:
-        self._file = ExactFile(file)
+        self._file, self._expected = ExactFile(file), expected
         self._name, self._limits, self._on_damage = name, limits, on_damage
         self._declared = Declared()
         self._last_time_ns: int | None = None
@@ -115,11 +119,38 @@ class ChunkReader:
 
     def chunks(self, first: int = 0, end_ns: int | None = None) -> Iterator[list[TopicMessage]]:
         """The chunks in file order; if the file is indexed, from chunk `first` and before a time."""
-        if self._index is None:
-            return self._streamed()
-        return self._indexed(
-            [c for c in self._index.chunks[first:] if end_ns is None or c.message_start_time < end_ns]
-        )
+        try:
+            if self._index is None:
+                yield from self._streamed()
+                return
+            for index in self._index.chunks[first:]:
+                if end_ns is None or index.message_start_time < end_ns:
+                    yield from self._indexed(index)
+        except UnknownPacking as error:
+            raise StreamError(
+                self._name, error, "zstd, lz4 or none: other packings are not supported"
+            ) from None
+
+    def chunks_with(self, topics: Collection[str]) -> list[ChunkIndex]:
+        """The chunks of an indexed file that hold messages on some topics, in file order."""
+        assert self._index is not None
+        numbers = {number for topic in topics for number in self._declared.numbers_of(topic)}
+        return [chunk for chunk in self._index.chunks if not numbers.isdisjoint(chunk.message_index_offsets)]
+
+    def read_chunk(self, index: ChunkIndex) -> list[TopicMessage]:
+        """The messages of one chunk of an indexed file; none where it is damaged and that was told."""
+        try:
+            return [message for messages in self._indexed(index) for message in messages]
+        except UnknownPacking as error:
+            raise StreamError(
+                self._name, error, "zstd, lz4 or none: other packings are not supported"
+            ) from None
+
+    @property
+    def start_ns(self) -> int:
+        """Log time of the first message of an indexed file."""
+        assert self._index is not None
+        return min((chunk.message_start_time for chunk in self._index.chunks), default=0)
 
     def chunk_at(self, time_ns: int) -> int:
         """The first chunk of an indexed file that does not end before a time."""
@@ -128,16 +159,21 @@ class ChunkReader:
 
     def times(self, topic: str) -> list[int]:
         """Log times of a topic's messages in an indexed file, ascending, ns."""
-        assert self._index is not None
-        numbers = self._declared.numbers_of(topic)
-        times: list[int] = []
-        for chunk in self._index.chunks:
-            for number in numbers:
-                if (offset := chunk.message_index_offsets.get(number)) is not None:
-                    times += self._indexed_times(offset)
-        return sorted(times)
+        return sorted(self.times_as_written(topic))
 
-    def _indexed_times(self, offset: int) -> list[int]:
+    def times_as_written(self, topic: str) -> list[int]:
+        """The same in the order of the file."""
+        times: list[int] = []
+        for chunk in self.chunks_with([topic]):
+            records: list[tuple[int, int]] = []
+            for number in self._declared.numbers_of(topic):
+                if (offset := chunk.message_index_offsets.get(number)) is not None:
+                    records += self._message_index(offset)
+            times += [time_ns for time_ns, _ in sorted(records, key=lambda record: record[1])]
+        return times
+
+    def _message_index(self, offset: int) -> list[tuple[int, int]]:
+        """(log time, offset in the chunk) of messages."""
         self._file.seek(offset)
         try:
             record = read_record(self._file, self._limits)
@@ -145,8 +181,8 @@ class ChunkReader:
                 raise RecordError("no message index where the index says")
             index = MessageIndex.read(ReadDataStream(io.BytesIO(record[1])))
         except (RecordError, CutOff, *DAMAGE) as error:
-            raise StreamError(self._name, f"a damaged index ({error})", EXPECTED) from None
-        return [time_ns for time_ns, _ in index.records]
+            raise StreamError(self._name, f"a damaged index ({error})", self._expected) from None
+        return list(index.records)
 
     def _read_index(self) -> FileIndex | None:
         index = None
@@ -157,20 +193,20 @@ class ChunkReader:
         self._file.seek(0)
         return index
 
-    def _indexed(self, chunks: list[ChunkIndex]) -> Iterator[list[TopicMessage]]:
-        for index in chunks:
-            self._file.seek(index.chunk_start_offset)
-            try:
-                record = read_record(self._file, self._limits)
-                if record is None or record[0] != Opcode.CHUNK:
-                    raise RecordError("no chunk where the index says")
-                head, data = parse_chunk(record[1], self._limits)
-                _compare(head, index)
-                messages = self._messages(unpack(head, data, self._limits))
-            except (RecordError, CutOff) as error:
-                times = (index.message_start_time, index.message_end_time)
-                self._report(str(error), times, list(index.message_index_offsets))
-                continue
+    def _indexed(self, index: ChunkIndex) -> Iterator[list[TopicMessage]]:
+        """The messages of one chunk; nothing where it is damaged and that was told."""
+        self._file.seek(index.chunk_start_offset)
+        try:
+            record = read_record(self._file, self._limits)
+            if record is None or record[0] != Opcode.CHUNK:
+                raise RecordError("no chunk where the index says")
+            head, data = parse_chunk(record[1], self._limits)
+            _compare(head, index)
+            messages = self._messages(unpack(head, data, self._limits))
+        except (RecordError, CutOff) as error:
+            times = (index.message_start_time, index.message_end_time)
+            self._report(str(error), times, list(index.message_index_offsets))
+        else:
             yield messages
 
     def _streamed(self) -> Iterator[list[TopicMessage]]:
@@ -196,10 +232,10 @@ class ChunkReader:
         if magic == MAGIC or (magic and len(magic) < len(MAGIC) and MAGIC.startswith(magic)):
             return
         if not magic:
-            raise StreamError(self._name, "an empty file", EXPECTED)
+            raise StreamError(self._name, "an empty file", self._expected)
         # A pipe that was joined late begins anywhere.
         if self._on_damage is None or not find_chunk(self._file, self._limits):
-            raise StreamError(self._name, "a file that is not MCAP", EXPECTED)
+            raise StreamError(self._name, "a file that is not MCAP", self._expected)
         self._report("no start of a file: it was joined late, or its start is damaged")
 
     def _record(self, opcode: int, content: bytes) -> list[TopicMessage]:
@@ -282,7 +318,7 @@ class ChunkReader:
             where += f": {named}at {times_ns[0] / 1e9:.3f}..{times_ns[1] / 1e9:.3f} s"
         elif self._last_time_ns is not None:
             where += f": after {self._last_time_ns / 1e9:.3f} s"
-        error = StreamError(where, f"damage ({what})", EXPECTED)
+        error = StreamError(where, f"damage ({what})", self._expected)
         if self._on_damage is None:
             raise error
         self._on_damage(error)

@@ -1,27 +1,27 @@
-"""Pictures in anyone's MCAP recording: Foxglove's messages of video and images, topic by topic."""
+"""Pictures in anyone's MCAP recording, topic by topic, in the order of their time where it has an index."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from typing import BinaryIO, Literal
 
-from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
-from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
-from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from google.protobuf.message import DecodeError
 from mcap.records import Message
 
 from mvcodec.container.chunks import ChunkReader, OnDamage, TopicMessage
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
-from mvcodec.container.recorded_rig import RecordedRig
+from mvcodec.container.picture_schemas import PARSERS, DamagedMessage, PictureKind
+from mvcodec.container.recorded_rig import RIG_SCHEMAS, RecordedRig
+from mvcodec.container.time_order import in_time_order, was_set_back
 from mvcodec.errors import StreamError
 
-SCHEMAS: dict[str, Any] = {
-    "foxglove.CompressedVideo": CompressedVideo,
-    "foxglove.CompressedImage": CompressedImage,
-    "foxglove.RawImage": RawImage,
-}
+EXPECTED = "an MCAP recording"
+
+Clock = Literal["stamp", "log"]
+"""When a picture was taken: by its message's own stamp, or by when the message was written down."""
+
+_RIG_CHUNKS = 16
+"""Chunks that are looked into for each topic about cameras, before the pictures are read."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,21 +30,22 @@ class RecordedPicture:
 
     Attributes:
         topic: of the message.
-        time_ns: when the picture was taken: the message's own stamp, or its log time where it has none.
-        schema: name, one of SCHEMAS.
-        data: the coded picture, or the pixels.
-        format: of the data, as the message says (for raw images its encoding).
-        frame_id: as the message says.
-        layout: (width, height, bytes a row) of raw images, else None.
+        time_ns: when the picture was taken, by the clock that was asked for.
+        log_ns: when the message was written down.
+        stamp_ns: its own stamp; 0 where it has none.
+        kind, data, format, frame_id, layout, big_endian: as in PictureMessage.
     """
 
     topic: str
     time_ns: int
-    schema: str
+    log_ns: int
+    stamp_ns: int
+    kind: PictureKind
     data: bytes
     format: str
     frame_id: str
     layout: tuple[int, int, int] | None
+    big_endian: bool
 
     @property
     def label(self) -> str:
@@ -53,17 +54,20 @@ class RecordedPicture:
 
 
 class RecordingReader:
-    """Reads the pictures of some topics in the order of the file.
+    """Reads the pictures of some topics.
 
     Args:
-        file: binary input, which may be a pipe.
-        name: what to call it in messages.
+        files: binary inputs, which may be pipes: the parts of one recording, in a row.
+        name: what to call them in messages.
         topics: those that are wanted.
+        clock: which time counts.
         limits: what is more than that is refused.
         on_damage: told of damage, behind which reading goes on; None raises it.
 
     Attributes:
-        rig: what was read about cameras, up to the end of the chunk at hand; None: it is not wanted.
+        rig: what was read about cameras; of files without index, up to the end of the chunk at hand.
+            None: it is not wanted any more.
+        notes: what is unusual about the files, one line each.
 
     Raises (also while iterating):
         StreamError: not MCAP, damaged, or a topic holds something other than pictures.
@@ -71,72 +75,112 @@ class RecordingReader:
 
     def __init__(
         self,
-        file: BinaryIO,
+        files: Sequence[BinaryIO],
         name: str,
         topics: Sequence[str],
+        clock: Clock = "stamp",
         limits: Limits = DEFAULT_LIMITS,
         on_damage: OnDamage | None = None,
     ) -> None:
-        self.name = name
-        self._chunks = ChunkReader(file, name, limits, on_damage)
+        self.name, self._clock, self._on_damage = name, clock, on_damage
+        self._parts = [ChunkReader(file, name, limits, on_damage, EXPECTED) for file in files]
         self._topics = frozenset(topics)
         self.rig: RecordedRig | None = RecordedRig()
-        if self._chunks.indexed:
-            self._check_topics(self._chunks.topics)
+        self.indexed = all(part.indexed for part in self._parts)
+        self.notes: list[str] = []
+        self._by_time = False
+        self._times: dict[str, list[int]] = {}
+        if self.indexed:
+            self._check_topics({topic for part in self._parts for topic in part.topics})
+            self._plan_order()
+            self._look_for_rig()
 
     @property
     def cut_off(self) -> bool:
         """Whether the input broke off, which is known when `pictures` has ended."""
-        return self._chunks.cut_off
+        return any(part.cut_off for part in self._parts)
 
     @property
-    def fps(self) -> float | None:
-        """Mean rate of the first topic in a complete file; None where it cannot be known yet."""
-        if not self._chunks.indexed:
-            return None
-        times = self._chunks.times(min(self._topics))
-        span_ns = times[-1] - times[0] if times else 0
-        return (len(times) - 1) * 1e9 / span_ns if span_ns else None
+    def log_times(self) -> dict[str, list[int]]:
+        """Log times of each topic, ascending; empty where there is no index."""
+        return self._times
 
     def pictures(self) -> Iterator[RecordedPicture]:
-        """Every picture on the topics, in the order of the file."""
-        for chunk in self._chunks.chunks():
-            self._collect_rig(chunk)
-            for topic, message in chunk:
-                if topic in self._topics:
-                    yield self._picture(topic, message)
-        self._check_topics(self._chunks.topics)
+        """Every picture on the topics: by log time where the files have an index, else in their order."""
+        for part in self._parts:
+            messages = in_time_order(part, self._topics) if self._by_time else self._as_written(part)
+            for topic, message in messages:
+                picture = self._picture(part, topic, message)
+                if picture is not None:
+                    yield picture
+        self._check_topics({topic for part in self._parts for topic in part.topics})
 
-    def _collect_rig(self, chunk: list[TopicMessage]) -> None:
-        if self.rig is not None:
-            for topic, message in chunk:
-                if topic not in self._topics:
-                    self.rig.push(self._chunks.schema_of(topic)[0], message.data)
+    def _plan_order(self) -> None:
+        for topic in self._topics:
+            written = [time for part in self._parts for time in part.times_as_written(topic)]
+            if was_set_back(written):
+                self.notes.append(
+                    f"the clock that {topic} was written down by was set back: its messages are taken in the"
+                    " order of the file"
+                )
+            self._times[topic] = sorted(written)
+        self._by_time = not self.notes
+        if self._by_time:
+            self._parts.sort(key=lambda part: part.start_ns)
+
+    def _look_for_rig(self) -> None:
+        """Read what the files say about cameras, wherever it is."""
+        assert self.rig is not None
+        for part in self._parts:
+            about = [topic for topic in part.topics if part.schema_of(topic) in RIG_SCHEMAS]
+            for topic in about:
+                for chunk in part.chunks_with([topic])[:_RIG_CHUNKS]:
+                    for found, message in part.read_chunk(chunk):
+                        if found == topic:
+                            self.rig.push(*part.schema_of(topic), message.data)
+
+    def _as_written(self, part: ChunkReader) -> Iterator[TopicMessage]:
+        for chunk in part.chunks():
+            if self.rig is not None and not self.indexed:
+                for topic, message in chunk:
+                    if topic not in self._topics:
+                        self.rig.push(*part.schema_of(topic), message.data)
+            yield from (item for item in chunk if item[0] in self._topics)
 
     def _check_topics(self, there: set[str]) -> None:
         missing = sorted(self._topics - there)
         if missing:
-            choices = [topic for topic in sorted(there) if self._chunks.schema_of(topic)[0] in SCHEMAS]
+            choices = [topic for topic in sorted(there) if self._parser(topic) is not None]
             expected = f"a topic with pictures: {', '.join(choices[:10]) or 'there is none'}"
             raise StreamError(self.name, f"no topic {missing[0]}", expected)
 
-    def _picture(self, topic: str, message: Message) -> RecordedPicture:
-        schema, encoding = self._chunks.schema_of(topic)
+    def _parser(self, topic: str) -> Callable[[bytes], object] | None:
+        return next((found for part in self._parts if (found := PARSERS.get(part.schema_of(topic)))), None)
+
+    def _picture(self, part: ChunkReader, topic: str, message: Message) -> RecordedPicture | None:
+        schema, encoding = part.schema_of(topic)
         label = f"{self.name}: {topic} at {message.log_time / 1e9:.3f} s"
-        if schema not in SCHEMAS or encoding != "protobuf":
-            raise StreamError(label, f"{schema or 'no schema'} as {encoding}", " or ".join(SCHEMAS))
+        if (schema, encoding) not in PARSERS:
+            known = " or ".join(dict.fromkeys(name for name, _ in PARSERS))
+            raise StreamError(label, f"{schema or 'no schema'} as {encoding}, which is not supported", known)
         try:
-            parsed = SCHEMAS[schema].FromString(message.data)
-        except DecodeError as error:
-            raise StreamError(label, f"a damaged message ({error})", schema) from None
-        stamp = parsed.timestamp.seconds * 1_000_000_000 + parsed.timestamp.nanos
-        raw = schema == "foxglove.RawImage"
+            found = PARSERS[schema, encoding](message.data)
+        except DamagedMessage as error:
+            damage = StreamError(label, f"a damaged message ({error})", schema)
+            if self._on_damage is None:
+                raise damage from None
+            self._on_damage(damage)
+            return None
+        by_stamp = self._clock == "stamp" and found.stamp_ns > 0
         return RecordedPicture(
             topic=topic,
-            time_ns=stamp if stamp > 0 else message.log_time,
-            schema=schema,
-            data=parsed.data,
-            format=parsed.encoding if raw else parsed.format,
-            frame_id=parsed.frame_id,
-            layout=(parsed.width, parsed.height, parsed.step) if raw else None,
+            time_ns=found.stamp_ns if by_stamp else message.log_time,
+            log_ns=message.log_time,
+            stamp_ns=found.stamp_ns,
+            kind=found.kind,
+            data=found.data,
+            format=found.format,
+            frame_id=found.frame_id,
+            layout=found.layout,
+            big_endian=found.big_endian,
         )

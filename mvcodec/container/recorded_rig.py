@@ -18,6 +18,16 @@ MAX_FRAMES = 10_000
 
 _HEADER_SCHEMA = "mvcodec.Header"
 
+RIG_SCHEMAS = frozenset(
+    {
+        ("foxglove.CameraCalibration", "protobuf"),
+        ("foxglove.FrameTransform", "protobuf"),
+        ("foxglove.FrameTransforms", "protobuf"),
+        (_HEADER_SCHEMA, "json"),
+    }
+)
+"""(schema, message encoding) of messages about cameras."""
+
 
 class RecordedRig:
     """Takes messages in; keeps the latest of each frame.
@@ -33,8 +43,10 @@ class RecordedRig:
         self.transforms: dict[str, Any] = {}
         self.nominal = False
 
-    def push(self, schema: str, data: bytes) -> None:
+    def push(self, schema: str, encoding: str, data: bytes) -> None:
         """Take a message of any schema; what is damaged or says nothing of the rig is passed over."""
+        if (schema, encoding) not in RIG_SCHEMAS:
+            return
         with suppress(DecodeError, StreamError):
             if schema == "foxglove.CameraCalibration":
                 calibration = CameraCalibration.FromString(data)

@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import lz4.frame
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -41,6 +42,14 @@ _FIRST_RESERVED, _FIRST_PRIVATE = 0x10, 0x80
 
 DAMAGE = (McapError, ValueError, struct.error, zstandard.ZstdError, KeyError)
 """What parsing raises on damaged bytes."""
+
+
+PACKINGS = (b"", b"zstd", b"lz4")
+"""How chunks may be packed."""
+
+
+class UnknownPacking(MvCodecError):
+    """A chunk packed in a way that mvcodec does not know. (Caught in this package.)"""
 
 
 class RecordError(MvCodecError):
@@ -132,7 +141,7 @@ class ChunkHead:
         start_ns, end_ns: times of its first and last message.
         size: unpacked, bytes.
         crc: CRC-32 of the unpacked data; 0 where there is none.
-        compression: "" or "zstd".
+        compression: "", "zstd" or "lz4".
     """
 
     start_ns: int
@@ -147,14 +156,15 @@ def parse_chunk(content: bytes, limits: Limits, *, whole: bool = True) -> tuple[
 
     Raises:
         FramingError: its length is wrong.
-        RecordError: a chunk beyond the limits, or packed in a way that mvcodec doesn't know.
+        RecordError: a chunk beyond the limits.
+        UnknownPacking: it is packed in a way that mvcodec doesn't know.
     """
     if len(content) < _CHUNK_HEAD.size:
         raise RecordError("a chunk that ends too early")
     start_ns, end_ns, size, crc, length = _CHUNK_HEAD.unpack_from(content)
     name = content[_CHUNK_HEAD.size : _CHUNK_HEAD.size + length]
-    if name not in (b"", b"zstd"):
-        raise RecordError(f"chunks packed with {name[:20]!r}")
+    if name not in PACKINGS:
+        raise UnknownPacking(f"chunks packed with {name[:20].decode(errors='replace')!r}")
     if size > limits.max_chunk_bytes:
         raise RecordError(f"a chunk of {size} bytes, more than max_chunk_bytes = {limits.max_chunk_bytes}")
     at = _CHUNK_HEAD.size + len(name)
@@ -172,6 +182,8 @@ def unpack(head: ChunkHead, data: bytes, limits: Limits, *, whole: bool = True) 
     """
     if head.compression == "zstd":
         data = _decompress(data, head.size, limits, whole=whole)
+    elif head.compression == "lz4":
+        data = _decompress_lz4(data, head.size)
     if whole and len(data) != head.size:
         raise RecordError(f"a chunk of {len(data)} bytes that announces {head.size}")
     if whole and head.crc and zlib.crc32(data) != head.crc:
@@ -191,6 +203,15 @@ def _decompress(data: bytes, size: int, limits: Limits, *, whole: bool) -> bytes
         with unpacker.stream_reader(io.BytesIO(data)) as stream:
             return stream.read(size + 1)
     except zstandard.ZstdError as error:
+        raise RecordError(f"a chunk that cannot be unpacked: {error}") from None
+
+
+def _decompress_lz4(data: bytes, size: int) -> bytes:
+    """At most one byte more than announced, whatever the data would unpack to."""
+    unpacker = lz4.frame.LZ4FrameDecompressor()
+    try:
+        return bytes(unpacker.decompress(data, max_length=size + 1))
+    except RuntimeError as error:
         raise RecordError(f"a chunk that cannot be unpacked: {error}") from None
 
 

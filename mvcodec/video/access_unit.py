@@ -48,6 +48,8 @@ class UnitFacts:
         sequences: in order.
         broken: (code, message) of each rule of the codec's own that it breaks.
         missing: what it builds on that never came.
+        recovers: it stands on its own without being a keyframe: pictures shown after it don't build on
+            any before it, but those shown before it may.
     """
 
     keyframe: bool
@@ -57,6 +59,7 @@ class UnitFacts:
     sequences: tuple[Sequence, ...] = ()
     broken: tuple[tuple[str, str], ...] = ()
     missing: str | None = None
+    recovers: bool = False
 
 
 class UnitReader(Protocol):

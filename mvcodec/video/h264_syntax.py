@@ -5,8 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mvcodec.video.access_unit import Colour, Sequence, UnitFacts
-from mvcodec.video.annexb import IDR_SLICE, PPS, SLICE, SPS, begins_with_start_code, nal_type, nal_units
+from mvcodec.video.annexb import (
+    IDR_SLICE,
+    PPS,
+    SEI,
+    SLICE,
+    SPS,
+    begins_with_start_code,
+    nal_type,
+    nal_units,
+)
 from mvcodec.video.bits import BitReader, NalError, payload
+from mvcodec.video.sei import recovers_at_once
 
 _HIGH_PROFILES = frozenset({100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135})
 """The profile_idc whose parameter sets have fields of chroma and bit depth (7.3.2.1.1)."""
@@ -92,12 +102,14 @@ class AccessUnit:
         picture_sets: (pic_parameter_set_id, seq_parameter_set_id), in order.
         slices: in order.
         kinds: nal_unit_type of every NAL unit.
+        recovery_point: a message says that pictures shown from here on are right (D.2.8).
     """
 
     sequence_sets: tuple[SequenceParameters, ...]
     picture_sets: tuple[tuple[int, int], ...]
     slices: tuple[SliceHeader, ...]
     kinds: tuple[int, ...]
+    recovery_point: bool = False
 
     @property
     def idr(self) -> bool:
@@ -137,7 +149,10 @@ class H264Parser:
                 self._pictures[pictures[-1][0]] = pictures[-1][1]
             elif kind in (SLICE, IDR_SLICE):
                 slices.append(self._slice(unit, kind))
-        return AccessUnit(tuple(sequences), tuple(pictures), tuple(slices), tuple(map(nal_type, units)))
+        recovery = any(nal_type(unit) == SEI and recovers_at_once(unit) for unit in units)
+        return AccessUnit(
+            tuple(sequences), tuple(pictures), tuple(slices), tuple(map(nal_type, units)), recovery
+        )
 
     def _slice(self, unit: bytes, kind: int) -> SliceHeader:
         bits = BitReader(payload(unit, limit=_HEAD_BYTES))
@@ -146,10 +161,9 @@ class H264Parser:
         frame_num = None if sequence is None else bits.u(sequence.frame_num_bits)
         return SliceHeader(first, slice_type, number, kind == IDR_SLICE, bool(unit[0] & 0x60), frame_num)
 
-    def frame_num_range(self, piece: SliceHeader) -> int | None:
-        """MaxFrameNum for a slice: its frame_num counts modulo this; None where it is not known."""
-        sequence = self._sequences.get(self._pictures.get(piece.picture_set, -1))
-        return None if sequence is None else 1 << sequence.frame_num_bits
+    def sequence_of(self, piece: SliceHeader) -> SequenceParameters | None:
+        """The parameters of a slice's sequence; None where they are not known."""
+        return self._sequences.get(self._pictures.get(piece.picture_set, -1))
 
 
 class H264Units:
@@ -158,6 +172,7 @@ class H264Units:
     def __init__(self) -> None:
         self._parser = H264Parser()
         self._next: int | None = None
+        self._last: int | None = None
 
     def push(self, data: bytes) -> UnitFacts:
         """See `UnitReader`."""
@@ -169,15 +184,20 @@ class H264Units:
             broken.append(("partition", "data partitions"))
         missing = None
         for piece in (piece for piece in unit.slices if piece.first_block == 0):
-            top = self._parser.frame_num_range(piece)
-            if top is None or piece.frame_num is None:
+            sequence = self._parser.sequence_of(piece)
+            if sequence is None or piece.frame_num is None:
                 broken.append(("parameter-sets", "a slice whose parameter sets never came"))
                 continue
+            # The second field of a frame has the number of the first.
+            legal = {self._next} if sequence.progressive else {self._next, self._last}
             if not piece.idr and self._next is None:
                 missing = "a picture before the first keyframe"
-            elif not piece.idr and piece.frame_num != self._next:
+            elif not piece.idr and piece.frame_num not in legal:
                 missing = f"frame_num {piece.frame_num}, expected {self._next}"
+            self._last = piece.frame_num
+            top = 1 << sequence.frame_num_bits
             self._next = (piece.frame_num + 1) % top if piece.reference else piece.frame_num
+        alone = bool(unit.slices) and all(piece.kind == I_SLICE for piece in unit.slices)
         return UnitFacts(
             keyframe=unit.idr,
             pictures=unit.pictures,
@@ -186,6 +206,7 @@ class H264Units:
             sequences=tuple(map(_facts, unit.sequence_sets)),
             broken=tuple(broken),
             missing=missing,
+            recovers=alone and unit.recovery_point,
         )
 
 

@@ -117,6 +117,7 @@ class HevcUnits:
             sequences=tuple(sequence.facts for sequence in sequences),
             broken=tuple(broken),
             missing=missing,
+            recovers=bool(kinds & set(_IRAP)),
         )
 
     def _picture(self, unit: bytes, kind: int, broken: list[tuple[str, str]]) -> str | None:
@@ -129,6 +130,8 @@ class HevcUnits:
         idr = kind in IDR_KINDS
         if idr:
             self._held, self._order, self._shown, self._started = {0}, 0, 0, True
+        elif kind in _IRAP and not self._started:
+            self._started = True
         elif not self._started:
             return "a picture before the first keyframe"
         if picture_set is None or sequence is None:
