@@ -137,7 +137,7 @@ def test_settings_outside_their_range_name_option_value_and_range(
 
 @pytest.mark.parametrize(
     "option",
-    ["--topics /a", "--when-behind block", "--on-error stop", "--nominal"],
+    ["--topics /a", "--when-behind block", "--clock log", "--nominal"],
 )
 def test_options_without_effect_are_refused(array: Path, tmp_path: Path, option: str) -> None:
     name, *value = option.split()
