@@ -17,7 +17,7 @@ MAX_MM = 65535
 def require_calibration(array: CameraArray, nominal: bool) -> None:
     """Raise SettingError where an array has no calibration and nobody accepts the nominal one."""
     if not (array.calibration.given or nominal):
-        expected = "one in the input or by --calibration FILE, or --nominal to accept nominal values"
+        expected = "one in the input or by `calibration`, or `nominal` to accept nominal values"
         raise SettingError("calibration", "none given", expected)
 
 

@@ -274,7 +274,7 @@ def test_frames_are_a_python_slice(frames: slice | None, expected: range) -> Non
 
 @pytest.mark.parametrize("frames", [slice(5, None), slice(3, 3), slice(4, 2), slice(0, 5, 2)])
 def test_empty_slices_and_steps_are_refused(frames: slice) -> None:
-    with pytest.raises(SettingError, match="--frames"):
+    with pytest.raises(SettingError, match=r"^frames: found"):
         resolve_frames(frames, 5, "x")
 
 

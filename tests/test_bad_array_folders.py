@@ -154,7 +154,7 @@ def test_views_of_different_size_or_length(tmp_path: Path) -> None:
 def test_grid_must_agree_with_the_folder(tmp_path: Path) -> None:
     folder = make_folder(tmp_path)
     assert open_input([folder], grid=(2, 3)).array.rows == 2
-    with pytest.raises(SettingError, match=r"--grid: found 3x2, expected 2x3"):
+    with pytest.raises(SettingError, match=r"^grid: found 3x2, expected 2x3"):
         open_input([folder], grid=(3, 2))
 
 

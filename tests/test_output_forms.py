@@ -165,11 +165,11 @@ def test_mosaic_of_single_views_is_filled_up(tmp_path: Path) -> None:
 def test_bad_forms(tmp_path: Path) -> None:
     array = array_of(3, 3)
     plan = OutputPlan(array, (Viewpoint(0, 0),), None)
-    with pytest.raises(SettingError, match=r"--format: found gif, expected array \| png \| mp4 \| mosaic"):
+    with pytest.raises(SettingError, match=r"^format: found gif, expected array \| png \| mp4 \| mosaic"):
         open_form("gif", tmp_path, plan)
     with pytest.raises(SettingError, match=r"a \.mp4 or \.png file"):
         open_form("mosaic", tmp_path / "m.jpg", plan)
-    with pytest.raises(SettingError, match="--view: found 1 single views, expected a whole grid"):
+    with pytest.raises(SettingError, match=r"^views: found 1 single views, expected a whole grid"):
         open_form("array", tmp_path, plan)
     with pytest.raises(SettingError, match="grid"):
         OutputPlan(array, (Viewpoint(0, 0),), (2, 2))

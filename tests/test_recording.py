@@ -122,7 +122,7 @@ def test_bad_recordings_and_settings_are_named() -> None:
         RecordingSettings((("/a", "/a"),))
     with pytest.raises(SettingError, match="rows of one length"):
         RecordingSettings((("/a", "/b"), ("/c",)))
-    with pytest.raises(SettingError, match="--fps: found 0"):
+    with pytest.raises(SettingError, match=r"^fps: found 0"):
         RecordingSettings(GRID, fps=0)
     with pytest.raises(StreamError, match="a file that is not MCAP"):
         _read(b"something else entirely")

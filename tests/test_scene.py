@@ -191,7 +191,7 @@ def test_motorcycle_is_the_real_pair_with_its_truth() -> None:
     ("settings", "option"),
     [
         (SceneSettings(grid=(2, 2)), "--grid: found 2x2, expected 1x2"),
-        (SceneSettings(size=(640, 360)), "--size: found 640x360, expected 741x500"),
+        (SceneSettings(size=(640, 360)), "^size: found 640x360, expected 741x500"),
         (SceneSettings(frames=2), "--frames: found 2, expected 1"),
     ],
 )
@@ -240,12 +240,12 @@ def test_bad_settings(bad: dict[str, object], option: str) -> None:
 
 
 def test_the_room_has_an_end() -> None:
-    with pytest.raises(SettingError, match="--size: found 20x81, expected at most 4 times as high as wide"):
+    with pytest.raises(SettingError, match=r"^size: found 20x81, expected at most 4 times as high as wide"):
         make_scene("room", SceneSettings(size=(20, 81)))
 
 
 def test_unknown_scene() -> None:
-    with pytest.raises(SettingError, match=r"--scene: found kitchen, expected room \| motorcycle"):
+    with pytest.raises(SettingError, match=r"^scene: found kitchen, expected room \| motorcycle"):
         make_scene("kitchen")
 
 

@@ -255,7 +255,7 @@ def test_a_quilt_has_the_leftmost_view_first_and_its_focus_in_the_middle_of_the_
 
 def test_styles_refuse_grids_that_mean_nothing_to_them() -> None:
     for style in ("mono", "side-by-side", "anaglyph"):
-        with pytest.raises(SettingError, match="--grid: found 2x3"):
+        with pytest.raises(SettingError, match=r"^grid: found 2x3"):
             STYLES[style](settings((2, 3)))
     with pytest.raises(SettingError, match="expected 1xN"):
         STYLES["epipolar"](settings((2, 3)))

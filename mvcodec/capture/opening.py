@@ -49,7 +49,7 @@ def open_input(
     """
     timing, reading = timing or Timing(), reading or Reading()
     if not paths:
-        raise SettingError("INPUT", "nothing", "an array folder, or video files and --grid RxC")
+        raise SettingError("INPUT", "nothing", "an array folder, or video files and `grid`, RxC")
     for path in paths:
         if not path.exists():
             raise InputError(path, "nothing there", "an array folder or a video file")
@@ -64,7 +64,7 @@ def _open_folder(
     manifest = read_manifest(_find_manifest(path))
     if grid not in (None, (manifest.rows, manifest.cols)):
         raise SettingError(
-            "--grid", _grid_text(grid), f"{manifest.rows}x{manifest.cols} as {manifest.path} says"
+            "grid", _grid_text(grid), f"{manifest.rows}x{manifest.cols} as {manifest.path} says"
         )
     depth = BitDepth(str(path), reading.bits)
     views = _open_views(manifest.views, lambda files: _open_view(files, depth))
@@ -130,10 +130,10 @@ def _open_videos(
         if path.is_dir():
             raise InputError(path, "a folder among several inputs", "video files only, or one array folder")
     if grid is None:
-        raise SettingError("--grid", "nothing", f"RxC for {len(paths)} video files in row order")
+        raise SettingError("grid", "nothing", f"RxC for {len(paths)} video files in row order")
     rows, cols = grid
     if rows < 1 or cols < 1 or rows * cols != len(paths):
-        raise SettingError("--grid", _grid_text(grid), f"RxC with R*C = {len(paths)}, the number of files")
+        raise SettingError("grid", _grid_text(grid), f"RxC with R*C = {len(paths)}, the number of files")
     files = {(row, col): paths[row * cols + col] for row in range(rows) for col in range(cols)}
     views = _open_views(files, VideoView)
     first = views[0, 0]

@@ -58,7 +58,7 @@ def pair_pictures(
         SettingError: a tolerance outside of 0..10000 ms.
     """
     if tolerance_ms is not None and not 0 <= tolerance_ms <= MAX_TOLERANCE_MS:
-        raise SettingError("--tolerance-ms", tolerance_ms, f"0..{MAX_TOLERANCE_MS:g} ms")
+        raise SettingError("tolerance_ms", tolerance_ms, f"0..{MAX_TOLERANCE_MS:g} ms")
     first = next(iter(times_ns))
     if all(tuple(times) == tuple(times_ns[first]) for times in times_ns.values()):
         everything = tuple(range(len(times_ns[first])))
@@ -121,7 +121,7 @@ def _span_notes(
     if begin > end:
         return [
             f"{names[early]} ends at {end:.3f} s, before {names[late]} begins at {begin:.3f} s;"
-            " --offset CAMERA=MS shifts a camera's clock"
+            " `offsets_ms` CAMERA=MS shifts a camera's clock"
         ]
     most = max(outside, key=lambda view: outside[view])
     return [
@@ -172,6 +172,6 @@ def _offset_notes(
             ]
         return [
             f"pictures of {names[view]} and {names[first]} in one frame set are up to"
-            f" {max(-apart[0], apart[-1]) / 1e6:.4g} ms apart; --tolerance-ms leaves out those further apart"
+            f" {max(-apart[0], apart[-1]) / 1e6:.4g} ms apart; `tolerance_ms` leaves out those further apart"
         ]
     return []

@@ -1,4 +1,4 @@
-"""Which cameras of a grid are real (coded): the `--real` setting."""
+"""Which cameras of a grid are real (coded): the setting `real`."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _refusal(text: str, rows: int, cols: int) -> SettingError:
         f"corners, all, every:K with K one of {steps}, "
         f"or rows ({_listed(rows)}) x cols ({_listed(cols)}) for this {rows}x{cols} grid"
     )
-    return SettingError("--real", text or "nothing", expected)
+    return SettingError("real", text or "nothing", expected)
 
 
 def _listed(count: int) -> str:

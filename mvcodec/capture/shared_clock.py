@@ -114,10 +114,10 @@ def _rate(
     guessed = [reader for view, reader in videos.items() if view not in known]
     if guessed:
         fps = guessed[0].fps
-        _warn(f"{name}: its video files have no times; {fps:g} fps are guessed. --fps N says what is right")
+        _warn(f"{name}: its video files have no times; {fps:g} fps are guessed. `fps` N says what is right")
         return fps
     if default_fps is None:
-        raise InputError(name, "no frame rate", "--fps N")
+        raise InputError(name, "no frame rate", "`fps` N")
     return default_fps
 
 
@@ -128,7 +128,7 @@ def _offsets_ns(views: Mapping[Position, ViewReader], timing: Timing) -> dict[Po
         if len(named) != 1:
             choices = ", ".join(list(_labels(views).values())[:4])
             what = "no such camera" if not named else f"{len(named)} cameras of that name"
-            raise SettingError("--offset", f"{camera} ({what})", f"CAMERA=MS, CAMERA one of {choices} ...")
+            raise SettingError("offsets_ms", f"{camera} ({what})", f"CAMERA=MS, CAMERA one of {choices} ...")
         found[named[0]] = round(offset_ms * 1e6)
     return found
 

@@ -75,9 +75,9 @@ def resolve_frames(frames: slice | None, count: int, source: str) -> range:
     if frames is None:
         return range(count)
     if frames.step not in (None, 1):
-        raise SettingError("--frames", f"step {frames.step}", "A:B, consecutive frames")
+        raise SettingError("frames", f"step {frames.step}", "A:B, consecutive frames")
     numbers = range(*frames.indices(count))
     if not numbers:
         found = ":".join("" if end is None else str(end) for end in (frames.start, frames.stop))
-        raise SettingError("--frames", found, f"A:B that holds some of the {count} frames of {source}")
+        raise SettingError("frames", found, f"A:B that holds some of the {count} frames of {source}")
     return numbers

@@ -41,10 +41,10 @@ class Timing:
 
     def __post_init__(self) -> None:
         if self.fps is not None and not MIN_FPS <= self.fps <= MAX_FPS:
-            raise SettingError("--fps", self.fps, f"{MIN_FPS:g}..{MAX_FPS:g}")
+            raise SettingError("fps", self.fps, f"{MIN_FPS:g}..{MAX_FPS:g}")
         for camera, offset in self.offsets_ms.items():
             if not math.isfinite(offset):
-                raise SettingError("--offset", f"{camera}={offset}", "CAMERA=MS, a number of milliseconds")
+                raise SettingError("offsets_ms", f"{camera}={offset}", "CAMERA=MS, a number of milliseconds")
 
 
 def steady_rate(times_ns: Sequence[int], unit_ns: float, stated: Sequence[Fraction]) -> Fraction | None:

@@ -31,15 +31,43 @@ OPTIONS = {
     "preset": "--preset",
     "codec": "--codec",
     "threads": "--threads",
+    "anchors": "--anchors",
+    "focus_px": "--refocus",
+    "format": "--format",
+    "fps": "--fps",
+    "host": "--host",
+    "live_view": "--live-view",
+    "nominal": "--nominal",
+    "offsets_ms": "--offset",
+    "path": "--path",
+    "port": "--port",
+    "qps": "--qp",
+    "real": "--real",
+    "scene": "--scene",
+    "seed": "--seed",
+    "size": "--size",
+    "style": "--style",
+    "tolerance_ms": "--tolerance-ms",
+    "topics": "--topics",
+    "views": "--view",
 }
 """The options behind the library's settings."""
+
+_SETTING = re.compile(r"(?<![\w:.])\w+(?=$|,| )")
+_QUOTED = re.compile(r"`(\w+)`")
 
 DEFAULT_SYNTHESIZER = "layered"
 
 
 def as_option(error: SettingError) -> SettingError:
-    """The same error with the library's setting under the name of its option."""
-    return SettingError(OPTIONS.get(error.setting, error.setting), error.found, error.expected)
+    """The same error with the library's settings under the names of their options."""
+    setting = _SETTING.sub(lambda name: OPTIONS.get(name[0], name[0]), error.setting)
+    return SettingError(setting, error.found, in_options(error.expected))
+
+
+def in_options(text: str) -> str:
+    """A message of the library, where settings stand in backquotes, in words of the command line."""
+    return _QUOTED.sub(lambda name: OPTIONS.get(name[1], name[0]), text)
 
 
 def join_negative_values(argv: Sequence[str]) -> list[str]:

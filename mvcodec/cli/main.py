@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 import mvcodec
-from mvcodec.cli.arguments import as_option, join_negative_values
+from mvcodec.cli.arguments import as_option, in_options, join_negative_values
 from mvcodec.cli.standard_streams import ReaderGone, checked_streams
 from mvcodec.cli.warning_lines import WarningLines
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
@@ -139,4 +139,4 @@ def _fail(error: object, code: int) -> int:
 
 
 def _one_line(message: object) -> str:
-    return " ".join(str(message).split())
+    return in_options(" ".join(str(message).split()))

@@ -8,6 +8,7 @@ import warnings
 from dataclasses import dataclass, field
 from typing import TextIO
 
+from mvcodec.cli.arguments import in_options
 from mvcodec.closing import Closing
 from mvcodec.errors import MvCodecWarning
 
@@ -47,7 +48,7 @@ class WarningLines(Closing):
             text = warnings.formatwarning(message, category, filename, lineno, line)
             _write(text.rstrip(), file or sys.stderr)
             return
-        text = " ".join(str(message).split())
+        text = in_options(" ".join(str(message).split()))
         kind = self._kinds.setdefault(_NUMBER.sub("#", text), _Kind())
         if text in kind.texts:
             return

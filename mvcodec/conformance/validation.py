@@ -35,7 +35,7 @@ class FileKind(StrEnum):
     ARRAY = "array"
     """A file of FORMAT.md."""
     VIEWS = "views"
-    """Video topics without our header, as `decode --format mcap` and others write."""
+    """Video topics without our header, as decoding into the form mcap and others write."""
     POINTS = "points"
     """Point clouds, as `export-points` and others write."""
 

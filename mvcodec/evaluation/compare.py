@@ -38,7 +38,7 @@ def compare(
 
     Args:
         frames: a range of the frames that both hold (a slice of step 1); all of them if None.
-        provenance: the folder where ``decode --provenance`` wrote (the decoded array's own one, as a
+        provenance: the folder where `ProvenanceWriter` wrote (the decoded array's own one, as a
             rule); the virtual views are measured by how many cameras saw each pixel then.
         immersive: IV-PSNR as well: 0.6 s for a picture of 960 x 640, where all others take 0.04 s.
         on_ssim_map: called, from any thread, with each view of the first frame and its `ssim_picture`.

@@ -95,7 +95,7 @@ class Comparison:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """The form that ``mvcodec compare --json`` prints."""
+        """As plain JSON values."""
         metrics = self.measured
         document: dict[str, Any] = {metric: self.summary(metric).to_json() for metric in metrics}
         document["views"] = [

@@ -79,7 +79,7 @@ class ProvenanceMeter:
 
 
 def read_seen_by(folder: Path, view: Position, frame: int, array: CameraArray) -> NDArray[np.uint8]:
-    """How many real cameras saw each pixel of a view, as ``decode --provenance`` wrote it.
+    """How many real cameras saw each pixel of a view, as `ProvenanceWriter` wrote it.
 
     Args:
         folder: that of the decoded array.
@@ -95,5 +95,5 @@ def read_seen_by(folder: Path, view: Position, frame: int, array: CameraArray) -
     """
     path = folder / view_name(view) / provenance_name(frame)
     if not path.is_file():
-        raise InputError(path, "no such file", "one as decode --provenance writes it")
+        raise InputError(path, "no such file", "one, as decoding with provenance writes it")
     return seen_by(read_picture(path, (array.width, array.height)))

@@ -58,10 +58,10 @@ class Study:
 
     def __post_init__(self) -> None:
         if not self.qps or any(a >= b for a, b in zip(self.qps, self.qps[1:], strict=False)):
-            raise SettingError("--qp", ",".join(map(str, self.qps)), "one or more QPs, ascending")
+            raise SettingError("qps", ",".join(map(str, self.qps)), "one or more QPs, ascending")
         for name in self.anchors:
             if name not in ANCHORS:
-                raise SettingError("--anchors", name, f"some of {', '.join(ANCHORS)}")
+                raise SettingError("anchors", name, f"some of {', '.join(ANCHORS)}")
         for name in self.anchor_codecs:
             find_codec(name)
         for qp in self.qps:

@@ -235,7 +235,7 @@ def open_form(name: str, target: Path, plan: OutputPlan) -> ViewWriter:
         OutputError: the system refuses.
     """
     if name not in FORMS:
-        raise SettingError("--format", name, " | ".join(FORMS))
+        raise SettingError("format", name, " | ".join(FORMS))
     return FORMS[name](target, plan)
 
 
@@ -249,9 +249,7 @@ def grid_facts(plan: OutputPlan) -> ArrayFacts:
         SettingError: the plan is no full grid.
     """
     if plan.grid is None:
-        raise SettingError(
-            "--view", f"{len(plan.viewpoints)} single views", "a whole grid for --format array"
-        )
+        raise SettingError("views", f"{len(plan.viewpoints)} single views", "a whole grid for `format` array")
     array, (rows, cols) = plan.array, plan.grid
     # Old grid steps in one new step; an axis of one view has no step.
     down = (array.rows - 1) / (rows - 1) if rows > 1 else 0.0

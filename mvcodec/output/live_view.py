@@ -55,7 +55,7 @@ class LiveView(Closing):
         except RuntimeError as error:
             reason = str(error).removeprefix("FoxgloveError: ")
             expected = "an address of this machine and a free port"
-            raise SettingError("--live-view", f"{host}:{port} ({reason})", expected) from None
+            raise SettingError("live_view", f"{host}:{port} ({reason})", expected) from None
         self.url = f"ws://{f'[{host}]' if ':' in host else host}:{self._server.port}"
 
     def add_channel(self, topic: str, encoding: str, name: str, schema_encoding: str, schema: bytes) -> None:

@@ -60,11 +60,11 @@ class ShotSettings:
     def __post_init__(self) -> None:
         if self.grid is not None and self.grid[0] * self.grid[1] > MAX_VIEWS:
             raise SettingError(
-                "--grid", f"{self.grid[0]}x{self.grid[1]}", f"{MAX_VIEWS} views in one picture at most"
+                "grid", f"{self.grid[0]}x{self.grid[1]}", f"{MAX_VIEWS} views in one picture at most"
             )
         if self.focus_px is not None and not abs(self.focus_px) <= self.array.width:
             expected = f"at most {self.array.width} px, a picture's width, either way"
-            raise SettingError("--refocus", f"{self.focus_px:g}", expected)
+            raise SettingError("focus_px", f"{self.focus_px:g}", expected)
 
     @classmethod
     def of(cls, decoded: DecodedSet, grid: Grid | None = None, focus_px: float | None = None) -> ShotSettings:
@@ -96,7 +96,7 @@ class Shot:
 def _mono(settings: ShotSettings) -> Shot:
     if settings.focus_px is not None:
         return _refocused(settings, settings.focus_px)
-    _refuse_grid(settings, "mono without --refocus")
+    _refuse_grid(settings, "mono without `focus_px`")
     return Shot(lambda viewpoint: (viewpoint,), lambda _, views: next(views).pixels)
 
 
@@ -164,7 +164,7 @@ def _epipolar(settings: ShotSettings) -> Shot:
     array, grid = settings.array, settings.grid
     along_column = array.cols == 1
     if grid is not None and 1 not in grid:
-        raise SettingError("--grid", f"{grid[0]}x{grid[1]}", "1xN for --style epipolar")
+        raise SettingError("grid", f"{grid[0]}x{grid[1]}", "1xN for `style` epipolar")
     count = max(grid) if grid else SLICE_VIEWS
 
     def places(viewpoint: Viewpoint) -> tuple[Viewpoint, ...]:
@@ -235,12 +235,12 @@ def _along_row(array: CameraArray, viewpoint: Viewpoint, count: int) -> tuple[Vi
 
 def _refuse_grid(settings: ShotSettings, style: str) -> None:
     if settings.grid is not None:
-        expected = f"none for --style {style}, which is not made of a grid of views"
-        raise SettingError("--grid", f"{settings.grid[0]}x{settings.grid[1]}", expected)
+        expected = f"none for `style` {style}, which is not made of a grid of views"
+        raise SettingError("grid", f"{settings.grid[0]}x{settings.grid[1]}", expected)
 
 
 def _want_columns(settings: ShotSettings, style: str) -> None:
     if settings.array.cols == 1:
         raise SettingError(
-            "--style", style, "another one: this array has one column, its views lie above each other"
+            "style", style, "another one: this array has one column, its views lie above each other"
         )

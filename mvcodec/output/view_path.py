@@ -46,7 +46,7 @@ def walk_shape(name: str, array: CameraArray, count: int) -> tuple[Viewpoint, ..
         SettingError: no such shape.
     """
     if name not in SHAPES:
-        raise SettingError("--path", name, f"one of {', '.join(SHAPES)}, or a file *{FILE_SUFFIX}")
+        raise SettingError("path", name, f"one of {', '.join(SHAPES)}, or a file *{FILE_SUFFIX}")
     places = (SHAPES[name](2 * math.pi * number / count) for number in range(count))
     if array.cols == 1:
         places = ((row or col, 0.0) for row, col in places)

@@ -58,7 +58,7 @@ def serve(
     with listener:
         url = page_url(host, listener.getsockname()[1])
         if not is_loopback(host):
-            text = f"--host {host}: everyone who reaches this machine over the network can watch this file"
+            text = f"`host` {host}: everyone who reaches this machine over the network can watch this file"
             warnings.warn(text, MvCodecWarning, stacklevel=2)
         config = uvicorn.Config(
             make_app(broadcast, AccessRules(host)),
@@ -109,7 +109,7 @@ def _bind(host: str, port: int) -> socket.socket:
             raise
     except OSError as error:
         found = f"{host}, {port} ({error.strerror or error})"
-        raise SettingError("--host, --port", found, "an address of this machine and a free port") from None
+        raise SettingError("host, port", found, "an address of this machine and a free port") from None
     return listener
 
 

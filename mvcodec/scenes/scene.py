@@ -50,13 +50,13 @@ class SceneSettings:
 
     def __post_init__(self) -> None:
         if self.grid is not None and not all(1 <= side <= MAX_GRID_SIDE for side in self.grid):
-            raise SettingError("--grid", _by(self.grid), f"RxC, each 1..{MAX_GRID_SIDE}")
+            raise SettingError("grid", _by(self.grid), f"RxC, each 1..{MAX_GRID_SIDE}")
         if self.frames is not None and not 1 <= self.frames <= MAX_FRAMES:
-            raise SettingError("--frames", self.frames, f"1..{MAX_FRAMES}")
+            raise SettingError("frames", self.frames, f"1..{MAX_FRAMES}")
         if self.size is not None and not all(_MIN_SIDE <= side <= MAX_PICTURE_SIDE for side in self.size):
-            raise SettingError("--size", _by(self.size), f"WxH px, each {_MIN_SIDE}..{MAX_PICTURE_SIDE}")
+            raise SettingError("size", _by(self.size), f"WxH px, each {_MIN_SIDE}..{MAX_PICTURE_SIDE}")
         if self.seed < 0:
-            raise SettingError("--seed", self.seed, "a whole number from 0 on")
+            raise SettingError("seed", self.seed, "a whole number from 0 on")
 
 
 class Scene(Protocol):
@@ -107,7 +107,7 @@ class RoomScene:
         width, height = settings.size or _ROOM_SIZE
         if height > _TALLEST * width:
             # Beyond that the pictures would show where wall and floor end.
-            raise SettingError("--size", _by((width, height)), f"at most {_TALLEST} times as high as wide")
+            raise SettingError("size", _by((width, height)), f"at most {_TALLEST} times as high as wide")
         self.frame_count = settings.frames or _ROOM_FRAMES
         self._step_m = ROOM_SPAN_M / max(rows - 1, cols - 1, 1)
         self._optics = Optics(width, height, float(width))
@@ -203,13 +203,13 @@ class MotorcycleScene:
         self._disparity = np.where(np.isfinite(disparity), disparity, np.nan).astype(np.float32)
         height, width = left.shape[:2]
         for option, found, only in (
-            ("--grid", settings.grid, (1, 2)),
-            ("--size", settings.size, (width, height)),
+            ("grid", settings.grid, (1, 2)),
+            ("size", settings.size, (width, height)),
         ):
             if found not in (None, only):
                 raise SettingError(option, _by(found), f"{_by(only)}, the real pair of the scene motorcycle")
         if settings.frames not in (None, 1):
-            raise SettingError("--frames", settings.frames, "1, the real pair of the scene motorcycle")
+            raise SettingError("frames", settings.frames, "1, the real pair of the scene motorcycle")
         known = self._disparity[np.isfinite(self._disparity)]
         self.array = CameraArray(
             rows=1,
@@ -247,7 +247,7 @@ def make_scene(name: str, settings: SceneSettings | None = None) -> Scene:
         SettingError: no such scene, or settings that it can't take.
     """
     if name not in SCENES:
-        raise SettingError("--scene", name, " | ".join(SCENES))
+        raise SettingError("scene", name, " | ".join(SCENES))
     return SCENES[name](settings or SceneSettings())
 
 
