@@ -122,7 +122,9 @@ def test_cameras_without_a_common_time_are_refused(tmp_path: Path) -> None:
         write_video(tmp_path / "a.mkv", range(4), at_30([0, 1, 2, 3])),
         write_video(tmp_path / "b.mkv", range(4), at_30([40, 41, 42, 43])),
     ]
-    with pytest.raises(InputError, match=r"a.mkv ends at 0.100 s, before b.mkv begins at 1.333 s; --offset"):
+    with pytest.raises(
+        InputError, match=r"a.mkv ends at 0.100 s, before b.mkv begins at 1.333 s; `offsets_ms`"
+    ):
         opened(*paths)
 
 
@@ -181,7 +183,7 @@ def test_drop_frame_rates_are_exact(tmp_path: Path) -> None:
 def test_streams_without_times_take_the_rate_that_is_stated(tmp_path: Path) -> None:
     paths = [write_video(tmp_path / f"{c}.h264", range(6), form="h264", col=c) for c in (0, 1)]
     _, told = opened(*paths)
-    assert "have no times; 30 fps are guessed. --fps N" in told[0]
+    assert "have no times; 30 fps are guessed. `fps` N" in told[0]
     source, told = opened(*paths, fps=12.0)
     assert not told
     assert source.array.fps == 12.0

@@ -56,6 +56,7 @@ def test_no_option_is_named_outside_of_the_command_line() -> None:
         ("synthesizer dils:alpha", "--synthesizer dils:alpha"),
         ("matcher blocks:size", "--matcher blocks:size"),
         ("host, port", "--host, --port"),
+        ("--topics", "--topics"),
         ("OUT", "OUT"),
         ("JointSettings.jump", "JointSettings.jump"),
     ],

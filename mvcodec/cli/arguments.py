@@ -53,7 +53,7 @@ OPTIONS = {
 }
 """The options behind the library's settings."""
 
-_SETTING = re.compile(r"(?<![\w:.])\w+(?=$|,| )")
+_SETTING = re.compile(r"(?<![-\w:.])\w+(?=$|,| )")
 _QUOTED = re.compile(r"`(\w+)`")
 
 DEFAULT_SYNTHESIZER = "layered"
