@@ -148,12 +148,12 @@ def test_pictures_of_sixteen_bits_keep_their_levels(
 def test_pictures_that_use_fewer_bits_than_they_have_are_not_black(tmp_path: Path, bits: int) -> None:
     values = np.linspace(0, (1 << bits) - 1, 42).round().astype(np.uint16).reshape(6, 7)
     save(tmp_path / "deep.png", values)
-    with pytest.warns(MvCodecWarning, match=rf"stay below {1 << bits}: taken as {bits} bits; --bits N"):
+    with pytest.warns(MvCodecWarning, match=rf"stay below {1 << bits}: taken as {bits} bits; `bits` N"):
         picture = read_picture(tmp_path / "deep.png")
     assert np.abs(picture[..., 0] - values * (255 / ((1 << bits) - 1))).max() <= 0.51
     stated = read_picture(tmp_path / "deep.png", depth=BitDepth("x", 16))
     assert np.abs(stated[..., 0] - values / 257).max() <= 0.51
-    with pytest.raises(SettingError, match=r"--bits: found 7, expected 8\.\.16"):
+    with pytest.raises(SettingError, match=r"^bits: found 7, expected 8\.\.16"):
         BitDepth("x", 7)
 
 

@@ -1,10 +1,11 @@
 """How good every synthesizer is on every set, in dB of luma: a Markdown table.
 
-    python tools/synthesizer_table.py [--data DIR] [--sets A,B] [--matcher NAME] [--synthesizer NAME;NAME] [--json]
+    python tools/synthesizer_table.py [--data DIR] [--sets A,B] [--matcher NAME] [--synthesizer NAME;NAME]
+                                      [--json]
 
-Each figure is the mean over the virtual views. DIR is an array folder or a folder of them; without it, the sample
-scene. As in benchmark.py the corner cameras go in uncoded and the views of frame 0 are scored; all synthesizers
-see the same maps.
+Each figure is the mean over the virtual views. DIR is an array folder or a folder of them; without it, the
+sample scene. As in benchmark.py the corner cameras go in uncoded and the views of frame 0 are scored; all
+synthesizers see the same maps.
 """
 
 from __future__ import annotations

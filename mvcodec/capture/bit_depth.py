@@ -31,7 +31,7 @@ class BitDepth:
 
     def __init__(self, name: str, bits: int | None = None) -> None:
         if bits is not None and not 8 <= bits <= 16:
-            raise SettingError("--bits", bits, "8..16")
+            raise SettingError("bits", bits, "8..16")
         self._name, self._given, self._bits, self._told = name, bits, bits, False
 
     def look(self, pixels: DeepPixels) -> None:
@@ -68,4 +68,4 @@ class BitDepth:
         return self._bits
 
     def _warn(self, text: str) -> None:
-        warnings.warn(f"{self._name}: {text}; --bits N says what is right", MvCodecWarning, stacklevel=4)
+        warnings.warn(f"{self._name}: {text}; `bits` N says what is right", MvCodecWarning, stacklevel=4)

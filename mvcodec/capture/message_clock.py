@@ -87,8 +87,8 @@ class MessageClock:
             return None
         return (
             f"the stamps of {early} are {gap / 1e9:.3f} s ahead of those of {late}, though both were written"
-            " down at the same times: their cameras' clocks differ? --clock log pairs by when they were"
-            " written down, --offset TOPIC=MS shifts a camera"
+            " down at the same times: their cameras' clocks differ? `clock` log pairs by when they were"
+            " written down, `offsets_ms` TOPIC=MS shifts a camera"
         )
 
     def _shift(self, topic: _Topic, message: RecordedPicture) -> int:

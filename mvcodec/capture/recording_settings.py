@@ -20,7 +20,7 @@ class RecordingSettings:
 
     Attributes:
         topics: of every view of the grid, row by row.
-        real: which cameras are real, as `--real` has it.
+        real: which cameras are real, as `select_real` reads it.
         fps: nominal frame rate; None: from the recording's times.
         tolerance_ms: how far apart the pictures of one frame set may be taken; None: half of the
             shortest time from picture to picture.
@@ -46,15 +46,15 @@ class RecordingSettings:
         widths = {len(row) for row in self.topics}
         names = list(chain.from_iterable(self.topics))
         if len(widths) != 1 or not names or not all(names):
-            raise SettingError("--topics", f"rows of {sorted(widths)} topics", "rows of one length")
+            raise SettingError("topics", f"rows of {sorted(widths)} topics", "rows of one length")
         if len(set(names)) != len(names):
-            raise SettingError("--topics", "a topic twice", "each topic once")
+            raise SettingError("topics", "a topic twice", "each topic once")
         if self.fps is not None and not 0 < self.fps <= 1000:
-            raise SettingError("--fps", self.fps, "more than 0, at most 1000")
+            raise SettingError("fps", self.fps, "more than 0, at most 1000")
         if self.tolerance_ms is not None and not 0 <= self.tolerance_ms <= 10_000:
-            raise SettingError("--tolerance-ms", self.tolerance_ms, "0..10000 ms")
+            raise SettingError("tolerance_ms", self.tolerance_ms, "0..10000 ms")
         if self.clock not in get_args(Clock):
-            raise SettingError("--clock", self.clock, " or ".join(get_args(Clock)))
+            raise SettingError("clock", self.clock, " or ".join(get_args(Clock)))
 
     @property
     def grid(self) -> tuple[int, int]:
@@ -69,5 +69,7 @@ class RecordingSettings:
         """
         for topic in self.offsets_ms:
             if topic not in topics:
-                raise SettingError("--offset", f"{topic} (no such camera)", f"one of {', '.join(topics[:4])}")
+                raise SettingError(
+                    "offsets_ms", f"{topic} (no such camera)", f"one of {', '.join(topics[:4])}"
+                )
         return {topic: round(offset * 1e6) for topic, offset in self.offsets_ms.items()}

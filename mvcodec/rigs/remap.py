@@ -71,7 +71,7 @@ class Rectifier:
         self, rig: Rig, interpolation: str = DEFAULT_INTERPOLATION, *, match_colours: bool = True
     ) -> None:
         if interpolation not in INTERPOLATIONS:
-            raise SettingError("--interpolation", interpolation, " | ".join(INTERPOLATIONS))
+            raise SettingError("interpolation", interpolation, " | ".join(INTERPOLATIONS))
         self.rig, self._flag = rig, INTERPOLATIONS[interpolation]
         self._maps = {at: rectifying_maps(camera, at, rig.rectified) for at, camera in rig.cameras.items()}
         self._tables = {at: _table(camera) if match_colours else None for at, camera in rig.cameras.items()}

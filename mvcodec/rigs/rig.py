@@ -128,10 +128,10 @@ class Rig:
         """
         if (before.rows, before.cols) != (self.rows, self.cols):
             found = f"a rig of {self.rows}x{self.cols} cameras"
-            raise SettingError("--rig", found, f"{before.rows}x{before.cols}, the grid of the input")
+            raise SettingError("rig", found, f"{before.rows}x{before.cols}, the grid of the input")
         if (before.width, before.height) != self.source_size:
             found = "a rig of {}x{} px".format(*self.source_size)
-            raise SettingError("--rig", found, f"{before.width}x{before.height} px, the size of the input")
+            raise SettingError("rig", found, f"{before.width}x{before.height} px, the size of the input")
         after = self.rectified
         nominal = Calibration.nominal(after.width, after.height)
         calibration = Calibration(

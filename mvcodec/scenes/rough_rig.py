@@ -75,7 +75,7 @@ class RoughRigSettings:
     def __post_init__(self) -> None:
         for flaw in self.flaws:
             if flaw not in FLAWS:
-                raise SettingError("--rig", f"the flaw {flaw!r}", _EXPECTED)
+                raise SettingError("rig", f"the flaw {flaw!r}", _EXPECTED)
 
     @classmethod
     def from_text(cls, text: str) -> RoughRigSettings:
@@ -86,7 +86,7 @@ class RoughRigSettings:
         """
         match = _SPEC.fullmatch(text)
         if match is None:
-            raise SettingError("--rig", repr(text), _EXPECTED)
+            raise SettingError("rig", repr(text), _EXPECTED)
         flaws = FLAWS if match[2] is None else tuple(match[2].split(","))
         return cls(int(match[1] or 0), flaws)
 
