@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from mvcodec.array import Calibration, CameraArray, Position, Viewpoint
     from mvcodec.capture.opening import open_input
     from mvcodec.capture.source import ArraySource
-    from mvcodec.container.info import StreamInfo, read_info
+    from mvcodec.container.file_facts import StreamInfo, read_info
     from mvcodec.container.reader import McapReader
     from mvcodec.container.writer import McapWriter
     from mvcodec.decoding.decoder import Decoder
@@ -48,7 +48,7 @@ _MODULES = {
     "mvcodec.array": "Calibration CameraArray Position Viewpoint",
     "mvcodec.capture.opening": "open_input",
     "mvcodec.capture.source": "ArraySource",
-    "mvcodec.container.info": "StreamInfo read_info",
+    "mvcodec.container.file_facts": "StreamInfo read_info",
     "mvcodec.container.reader": "McapReader",
     "mvcodec.container.writer": "McapWriter",
     "mvcodec.decoding.decoder": "Decoder",

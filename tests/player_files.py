@@ -24,7 +24,7 @@ from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER
 from mvcodec.container import McapWriter
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.frames import Picture
-from mvcodec.output.sample import write_sample
+from mvcodec.output.scene_folder import write_sample
 from mvcodec.scenes.scene import SceneSettings
 
 FRAMES, GOP = 12, 4

@@ -197,3 +197,15 @@ def test_sample_scene_is_an_array_like_any_other(tmp_path: Path) -> None:
     succeeds("sample", tmp_path / "b", *options.split())
     first, second = (tmp_path / name / "r01_c02" / "000001.png" for name in "ab")
     assert first.read_bytes() == second.read_bytes()
+
+
+def test_another_codec_goes_all_the_way(array: Path, tmp_path: Path) -> None:
+    coded, clean, decoded = tmp_path / "x.mcap", tmp_path / "clean.mcap", tmp_path / "views"
+    fast = ("--preset", "ultrafast", "--frames", ":2", "--matcher", "sgbm", "--quiet")
+    succeeds("encode", array, coded, "--codec", "vp9", *fast)
+    assert "vp9" in succeeds("info", coded, "--json")
+    succeeds("recover", coded, clean, "--quiet")
+    succeeds("validate", clean)
+    succeeds("decode", clean, decoded, "--quiet")
+    found = json.loads(succeeds("compare", array, decoded, "--frames", ":2", "--quiet", "--json"))
+    assert found["psnr_y"]["real"] > 30

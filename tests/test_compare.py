@@ -15,7 +15,7 @@ from mvcodec.array import Position
 from mvcodec.capture import open_input
 from mvcodec.capture.picture_files import read_picture
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
-from mvcodec.evaluation.compare import common_frame_count, compare
+from mvcodec.evaluation.comparison import common_frame_count, compare
 from mvcodec.evaluation.flicker import temporal_psnr
 from mvcodec.evaluation.immersive import iv_psnr
 from mvcodec.evaluation.metrics import psnr, ssim, ssim_picture

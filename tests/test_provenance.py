@@ -20,7 +20,7 @@ from mvcodec.capture import open_input
 from mvcodec.capture.picture_files import read_picture
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import InputError
-from mvcodec.evaluation.compare import compare
+from mvcodec.evaluation.comparison import compare
 from mvcodec.evaluation.metrics import luma, psnr
 from mvcodec.evaluation.quality_by_provenance import ProvenanceMeter
 from mvcodec.frames import LayerStack, RenderedView

@@ -11,7 +11,7 @@ import pytest
 from mvcodec.array import Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.kernels.raycast import straightened
-from mvcodec.output.sample import write_sample
+from mvcodec.output.scene_folder import write_sample
 from mvcodec.scenes.renderer import Optics
 from mvcodec.scenes.rough_rig import FLAWS, RoughCamera, RoughRigSettings, RoughScene
 from mvcodec.scenes.scene import RoomScene, SceneSettings

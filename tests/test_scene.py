@@ -22,7 +22,7 @@ from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import OutputError, SettingError
 from mvcodec.evaluation.metrics import psnr
 from mvcodec.frames import FloatMap, Picture
-from mvcodec.output.sample import write_sample
+from mvcodec.output.scene_folder import write_sample
 from mvcodec.scenes.scene import SCENES, Scene, SceneSettings, make_scene
 from mvcodec.scenes.textures import photograph
 

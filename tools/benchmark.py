@@ -28,7 +28,7 @@ from mvcodec.capture import ArraySource, open_input
 from mvcodec.errors import InputError, SettingError
 from mvcodec.evaluation.quality import QualityMeter
 from mvcodec.layers.refinement import make_matcher
-from mvcodec.output.sample import write_sample
+from mvcodec.output.scene_folder import write_sample
 from mvcodec.scenes.scene import SceneSettings
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.synthesizers import make_synthesizer

@@ -35,7 +35,7 @@ from mvcodec.evaluation.quality import Comparison, QualityMeter
 from mvcodec.frames import DecodedSet, FrameSet, Picture
 from mvcodec.output.mosaic import contact_sheet, error_picture, mosaic
 from mvcodec.output.pictures import write_png
-from mvcodec.output.sample import write_sample
+from mvcodec.output.scene_folder import write_sample
 from mvcodec.output.video_file import Mp4Writer
 from mvcodec.scenes.scene import DEFAULT_SCENE, make_scene
 from mvcodec.synthesis.synthesizer import Synthesizer

@@ -12,7 +12,7 @@ from mvcodec.array import Position
 from mvcodec.capture import open_input, resolve_frames
 from mvcodec.cli.arguments import add_frames, add_output_options
 from mvcodec.cli.progress import progress
-from mvcodec.evaluation.compare import common_frame_count, compare
+from mvcodec.evaluation.comparison import common_frame_count, compare
 from mvcodec.evaluation.quality import Comparison
 from mvcodec.evaluation.quality_by_provenance import ProvenanceQuality
 from mvcodec.frames import Picture

@@ -8,7 +8,7 @@ from mvcodec.cli.arguments import add_output_options, pair_of_sizes, positive_in
 from mvcodec.cli.info import count
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.progress import progress
-from mvcodec.output.sample import make_sample, write_sample
+from mvcodec.output.scene_folder import make_sample, write_sample
 from mvcodec.scenes.rough_rig import FLAWS, RoughRigSettings
 from mvcodec.scenes.scene import DEFAULT_SCENE, SCENES, SceneSettings
 

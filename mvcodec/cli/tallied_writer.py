@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from mvcodec.cli.standard_streams import CountedOutput
 from mvcodec.container import McapWriter
-from mvcodec.container.info import Bits, StreamInfo
+from mvcodec.container.file_facts import Bits, StreamInfo
 from mvcodec.output.live_view import LiveView
 from mvcodec.stream import Packet, StreamHeader, TrackKind
 

@@ -32,7 +32,3 @@ class MapModel:
 H26X = MapModel(half_from=25, full=5, half=0, alternate=-2, fine_extra=5, octave=6)
 """H.264 and HEVC. x265's QPs have the steps of x264's: at QP 32 the model's choice is on the hull of both
 sets tried."""
-
-AOM = MapModel(half_from=30, full=12, half=0, alternate=-5, fine_extra=0, octave=14)
-"""AV1 and VP9, whose 64 quantisers stand for the same steps: 2.4 times as close as x264's. Nobody has
-measured their best maps."""
