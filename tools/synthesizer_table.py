@@ -21,7 +21,7 @@ from array_sets import add_options, find_sets, match_corners, run, say, scored_v
 from mvcodec.array import Viewpoint
 from mvcodec.capture import ArraySource
 from mvcodec.evaluation.quality import QualityMeter
-from mvcodec.output.sample import write_sample
+from mvcodec.output.scene_folder import write_sample
 from mvcodec.scenes.scene import SceneSettings
 from mvcodec.synthesis.synthesizers import make_synthesizer
 
