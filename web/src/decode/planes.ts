@@ -1,0 +1,53 @@
+/** A decoded picture's planes, taken out of the decoder's frame so that it can be closed at once. */
+
+/** 4:2:0, 8 bits, cropped to the stream's own visible size. */
+export interface Planes {
+  readonly width: number;
+  readonly height: number;
+  readonly y: Uint8Array;
+  /** Half the size each way, rounded up. */
+  readonly u: Uint8Array;
+  readonly v: Uint8Array;
+}
+
+export function planeBytes(planes: Planes): number {
+  return planes.y.length + planes.u.length + planes.v.length;
+}
+
+/** Copy a frame's planes and close it. Throws Error for a format that is not 8-bit 4:2:0. */
+export async function takePlanes(frame: VideoFrame): Promise<Planes> {
+  try {
+    const rect = frame.visibleRect;
+    const format = frame.format;
+    if (rect === null || (format !== "I420" && format !== "NV12")) {
+      throw new Error(`a decoder that gives ${format}, not I420 or NV12`);
+    }
+    const { width, height } = rect;
+    const [halfWidth, halfHeight] = [(width + 1) >> 1, (height + 1) >> 1];
+    const [luma, chroma] = [width * height, halfWidth * halfHeight];
+    const bytes = new Uint8Array(luma + 2 * chroma);
+    const layout: PlaneLayout[] = [{ offset: 0, stride: width }];
+    if (format === "I420") {
+      layout.push({ offset: luma, stride: halfWidth }, { offset: luma + chroma, stride: halfWidth });
+    } else {
+      layout.push({ offset: luma, stride: 2 * halfWidth });
+    }
+    await frame.copyTo(bytes, { rect, layout });
+    const y = bytes.subarray(0, luma);
+    if (format === "I420") return { width, height, y, u: bytes.subarray(luma, luma + chroma), v: bytes.subarray(luma + chroma) };
+    return { width, height, y, ...apart(bytes.subarray(luma)) };
+  } finally {
+    frame.close();
+  }
+}
+
+/** Pairs of chroma samples -> two planes. */
+function apart(pairs: Uint8Array): { u: Uint8Array; v: Uint8Array } {
+  const u = new Uint8Array(pairs.length / 2);
+  const v = new Uint8Array(pairs.length / 2);
+  for (let i = 0; i < u.length; i++) {
+    u[i] = pairs[2 * i];
+    v[i] = pairs[2 * i + 1];
+  }
+  return { u, v };
+}

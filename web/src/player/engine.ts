@@ -1,0 +1,304 @@
+/** What is shown: a recording, a frame and a viewpoint, drawn when they change and not otherwise. */
+
+import type { Header } from "../container/header.ts";
+import { openRecording } from "../container/open.ts";
+import { frameAt, frameCount, timeOf, type Recording } from "../container/recording.ts";
+import type { Source } from "../container/sources.ts";
+import { FrameStore } from "../decode/frame_store.ts";
+import { clampView, contributors, type Camera, type Viewpoint } from "../geometry.ts";
+import type { CameraFrame } from "../synthesis/camera_textures.ts";
+import { ViewRenderer, type Look, type Pixels } from "../synthesis/renderer.ts";
+import { drawShown, eyesOf, type Eyes } from "./drawing.ts";
+import { Playback } from "./playback.ts";
+import { Tempo } from "./tempo.ts";
+
+/** Told to whoever shows the controls. */
+export interface EngineEvents {
+  /** Another picture is on the screen. */
+  onFrame(): void;
+  /** Playback, loop or the file's length changed. */
+  onState(): void;
+  /** A picture has been waited for a while; false: it has come. */
+  onWaiting(isWaiting: boolean): void;
+  /** Something is wrong with the file; it goes on where `isFatal` is false. */
+  onTrouble(text: string, isFatal: boolean): void;
+}
+
+/** What is asked of the engine to show. */
+export interface Shown {
+  frame: number;
+  view: Viewpoint;
+  look: Look;
+  /** See `ViewSettings.dolly`. */
+  dolly: number;
+  eyes: Eyes;
+}
+
+interface Decoded {
+  readonly frame: number;
+  readonly frames: readonly CameraFrame[];
+  /** The cameras that were asked for. */
+  readonly asked: string;
+}
+
+/** A picture that takes longer is waited for visibly. */
+const WAITING_MS = 250;
+/** Frames that are decoded ahead while playing. */
+const PREFETCH = 4;
+/** The picture stands when nothing has changed for so long. */
+const STANDS_MS = 120;
+
+export class Engine {
+  readonly shown: Shown = { frame: 0, view: { row: 0, col: 0 }, look: "picture", dolly: 0, eyes: { mode: "one", distance: 0.5 } };
+  readonly playback = new Playback();
+  readonly tempo = new Tempo();
+  readonly #canvas: HTMLCanvasElement;
+  readonly #events: EngineEvents;
+  #source: Source | undefined;
+  #recording: Recording | undefined;
+  #store: FrameStore | undefined;
+  #renderer: ViewRenderer | undefined;
+  #decoded: Decoded | undefined;
+  #isFetching = false;
+  #isDirty = false;
+  #isFinal = false;
+  #tick: number | undefined;
+  #stands: ReturnType<typeof setTimeout> | undefined;
+  #waiters: { isDone: () => boolean; resolve: () => void }[] = [];
+  #isClosed = false;
+
+  constructor(canvas: HTMLCanvasElement, events: EngineEvents) {
+    this.#canvas = canvas;
+    this.#events = events;
+    canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    canvas.addEventListener("webglcontextrestored", () => this.#restore());
+  }
+
+  /** Read a file and show it from some seconds on; the view is the array's middle unless one is given. Throws Error. */
+  async open(source: Source, at: { seconds?: number; view?: Viewpoint | undefined } = {}): Promise<void> {
+    const recording = await openRecording(source, {
+      fromSeconds: at.seconds ?? 0,
+      tell: (text) => this.#events.onTrouble(text, false),
+      onGrowth: () => this.#grown(),
+    });
+    if (this.#isClosed) return recording.close();
+    this.#source = source;
+    this.#recording = recording;
+    this.#store = new FrameStore(recording, (text) => this.#events.onTrouble(text, false));
+    const { header } = recording;
+    this.#renderer = new ViewRenderer(this.#canvas, header);
+    this.shown.frame = frameAt(recording.spans, at.seconds ?? 0);
+    this.shown.view = clampView(header, at.view ?? { row: (header.rows - 1) / 2, col: (header.cols - 1) / 2 });
+    this.playback.setEnd(timeOf(recording.spans, this.count - 1) + 1 / header.fps);
+    await this.#settled();
+  }
+
+  close(): void {
+    this.#isClosed = true;
+    this.playback.pause();
+    if (this.#tick !== undefined) cancelAnimationFrame(this.#tick);
+    clearTimeout(this.#stands);
+    this.#recording?.close();
+    this.#store?.close();
+    this.#waiters.splice(0).forEach(({ resolve }) => resolve());
+  }
+
+  get isOpen(): boolean {
+    return this.#recording !== undefined;
+  }
+
+  /** Throws Error before a file is open. */
+  get header(): Header {
+    if (this.#recording === undefined) throw new Error("no file is open");
+    return this.#recording.header;
+  }
+
+  get count(): number {
+    return this.#recording === undefined ? 0 : frameCount(this.#recording);
+  }
+
+  get isGrowing(): boolean {
+    return this.#recording?.growing ?? false;
+  }
+
+  get traffic(): { requests: number; bytes: number } {
+    return this.#source?.traffic ?? { requests: 0, bytes: 0 };
+  }
+
+  /** The frame that is on the screen. */
+  get frame(): number {
+    return this.#decoded?.frame ?? 0;
+  }
+
+  timeOf(frame: number): number {
+    return this.#recording === undefined ? 0 : timeOf(this.#recording.spans, frame);
+  }
+
+  frameAt(seconds: number): number {
+    return this.#recording === undefined ? 0 : frameAt(this.#recording.spans, seconds);
+  }
+
+  /** Show a frame; resolves when it is on the screen. */
+  seek(frame: number): Promise<void> {
+    this.shown.frame = Math.min(Math.max(Math.round(frame) || 0, 0), Math.max(this.count - 1, 0));
+    this.playback.moveTo(this.timeOf(this.shown.frame));
+    return this.#settled();
+  }
+
+  /** Show a viewpoint; resolves when it is on the screen. */
+  look(view: Viewpoint): Promise<void> {
+    this.shown.view = clampView(this.header, view);
+    return this.#settled();
+  }
+
+  /** Change how it is shown. */
+  change(what: Partial<Omit<Shown, "frame" | "view">>): Promise<void> {
+    Object.assign(this.shown, what);
+    return this.#settled();
+  }
+
+  play(): void {
+    if (this.#recording === undefined || this.count < 2) return;
+    this.playback.play(this.timeOf(this.shown.frame));
+    this.#events.onState();
+    this.wake();
+  }
+
+  pause(): void {
+    this.playback.pause();
+    this.#events.onState();
+    this.wake();
+  }
+
+  /** The view that is shown, at picture size, whatever the screen shows of it. Throws Error before the first picture. */
+  pixels(): Pixels {
+    if (this.#renderer === undefined || this.#decoded === undefined) throw new Error("no picture yet");
+    const { view, look, dolly } = this.shown;
+    const pixels = this.#renderer.read(this.#decoded.frames, view, { look, fine: true, dolly });
+    this.#draw(true); // the canvas may have lost what it showed
+    return pixels;
+  }
+
+  /** Look whether there is something to do, with the next picture of the screen. */
+  wake(): void {
+    this.#isDirty = true;
+    if (this.#tick === undefined && !this.#isClosed) this.#tick = requestAnimationFrame((now) => this.#run(now));
+  }
+
+  async #settled(): Promise<void> {
+    const goal = { frame: this.shown.frame, view: this.shown.view };
+    this.wake();
+    await new Promise<void>((resolve) => {
+      // A later goal replaces this one.
+      const isDone = () =>
+        goal.view !== this.shown.view || (this.#decoded !== undefined && this.#decoded.frame === this.shown.frame && !this.#isDirty);
+      this.#waiters.push({ isDone, resolve });
+    });
+  }
+
+  #run(now: number): void {
+    this.#tick = undefined;
+    const { playback } = this;
+    if (playback.isPlaying) {
+      this.shown.frame = this.frameAt(playback.timeAt(now));
+      if (!playback.isPlaying) this.#events.onState();
+    }
+    if (this.#fetch() && this.#isDirty) {
+      this.#isDirty = false;
+      const moves = playback.isPlaying || this.#stands !== undefined;
+      this.#draw(!moves || this.tempo.isQuick);
+      if (moves) this.tempo.drawn(now);
+      this.#events.onFrame();
+      this.#standsSoon();
+    }
+    this.#waiters = this.#waiters.filter(({ isDone, resolve }) => !isDone() || void resolve());
+    if (playback.isPlaying) this.wake();
+  }
+
+  /** A picture that stands is drawn as well as can be. */
+  #standsSoon(): void {
+    clearTimeout(this.#stands);
+    this.#stands = setTimeout(() => {
+      this.#stands = undefined;
+      this.tempo.rest();
+      if (!this.#isFinal && !this.playback.isPlaying) this.wake();
+    }, STANDS_MS);
+  }
+
+  #draw(isFinal: boolean): void {
+    if (this.#renderer === undefined || this.#decoded === undefined) return;
+    this.#isFinal = isFinal;
+    drawShown(this.#renderer, this.#canvas, this.header, this.#decoded.frames, this.shown, isFinal ? 1 : this.tempo.detail, isFinal);
+  }
+
+  /** Whether what is to be shown is decoded; begins to decode it where it is not. */
+  #fetch(): boolean {
+    if (this.#recording === undefined || this.#store === undefined) return false;
+    const { frame } = this.shown;
+    const wanted = this.#wanted();
+    const asked = wanted.map(({ row, col }) => `${row},${col}`).join(" ");
+    if (this.#decoded?.frame === frame && this.#decoded.asked === asked) return true;
+    if (!this.#isFetching) void this.#decode(frame, wanted, asked);
+    // While the next frame is decoded the one that is there may be seen from elsewhere.
+    return false;
+  }
+
+  /** The cameras of all views that are drawn at once. */
+  #wanted(): Camera[] {
+    const { header } = this;
+    const found = new Map<string, Camera>();
+    const { view, eyes } = this.shown;
+    for (const one of eyes.mode === "one" ? [view] : eyesOf(header, view, eyes.distance)) {
+      for (const { camera } of contributors(header, one)) found.set(`${camera.row},${camera.col}`, camera);
+    }
+    return [...found.values()];
+  }
+
+  async #decode(frame: number, wanted: readonly Camera[], asked: string): Promise<void> {
+    this.#isFetching = true;
+    const timer = setTimeout(() => this.#events.onWaiting(true), WAITING_MS);
+    try {
+      const store = this.#store!;
+      const isWanted = () => this.playback.isPlaying || this.shown.frame === frame;
+      const frames = await store.get(frame, wanted, isWanted);
+      if (frames.length > 0 && store === this.#store) this.#decoded = { frame, frames, asked };
+      else if (frames.length === 0 && isWanted()) this.#skip(frame, asked);
+      if (this.playback.isPlaying) this.#prefetch(frame, wanted);
+    } catch (error) {
+      this.playback.pause();
+      this.#events.onTrouble((error as Error).message, true);
+      this.#waiters.splice(0).forEach(({ resolve }) => resolve());
+      return;
+    } finally {
+      clearTimeout(timer);
+      this.#isFetching = false;
+      this.#events.onWaiting(false);
+    }
+    this.wake();
+  }
+
+  /** No camera has this frame: the last picture stays, as if it were this one. */
+  #skip(frame: number, asked: string): void {
+    if (this.#decoded === undefined && frame + 1 < this.count) this.shown.frame = frame + 1;
+    else this.#decoded = { frame, frames: this.#decoded?.frames ?? [], asked };
+  }
+
+  #prefetch(frame: number, wanted: readonly Camera[]): void {
+    const isWanted = () => this.playback.isPlaying;
+    for (let next = frame + 1; next <= Math.min(frame + PREFETCH, this.count - 1); next++) {
+      void this.#store!.get(next, wanted, isWanted).catch(() => {}); // it is asked for again when it is due
+    }
+  }
+
+  #grown(): void {
+    this.playback.setEnd(this.timeOf(this.count - 1) + 1 / this.header.fps);
+    this.#events.onState();
+    this.wake();
+  }
+
+  #restore(): void {
+    if (this.#recording === undefined) return;
+    this.#renderer = new ViewRenderer(this.#canvas, this.header);
+    this.wake();
+  }
+}

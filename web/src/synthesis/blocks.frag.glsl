@@ -1,0 +1,30 @@
+#version 300 es
+// The nearest and the farthest code value of each block of each camera, cameras below one another.
+precision highp float;
+precision highp int;
+precision highp sampler2DArray;
+
+uniform sampler2DArray uCameras;
+uniform ivec2 uSize;   // of the picture, px
+uniform int uRows;     // of blocks in a picture
+
+out vec2 oBounds;
+
+const int BLOCK = 8;
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    int camera = at.y / uRows;
+    ivec2 first = ivec2(at.x, at.y % uRows) * BLOCK;
+    ivec2 end = min(first + BLOCK, uSize);
+    float high = 0.0;
+    float low = 1.0;
+    for (int y = first.y; y < end.y; y++) {
+        for (int x = first.x; x < end.x; x++) {
+            float code = texelFetch(uCameras, ivec3(x, y, camera), 0).a;
+            high = max(high, code);
+            low = min(low, code);
+        }
+    }
+    oBounds = vec2(high, low);
+}

@@ -1,0 +1,95 @@
+/** Small things about WebGL 2 that its API says at length. */
+
+/** Compile and link. Throws Error with the driver's own words. */
+export function makeProgram(gl: WebGL2RenderingContext, vertex: string, fragment: string): Program {
+  const program = gl.createProgram();
+  for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]] as const) {
+    const shader = gl.createShader(kind)!;
+    gl.shaderSource(shader, text);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost()) {
+      throw new Error(`a shader that does not compile: ${gl.getShaderInfoLog(shader)}`);
+    }
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+    throw new Error(`shaders that do not link: ${gl.getProgramInfoLog(program)}`);
+  }
+  return new Program(gl, program);
+}
+
+/** A program and where its uniforms are. */
+export class Program {
+  readonly #gl: WebGL2RenderingContext;
+  readonly #program: WebGLProgram;
+  readonly #places = new Map<string, WebGLUniformLocation | null>();
+
+  constructor(gl: WebGL2RenderingContext, program: WebGLProgram) {
+    this.#gl = gl;
+    this.#program = program;
+  }
+
+  use(): void {
+    this.#gl.useProgram(this.#program);
+  }
+
+  at(name: string): WebGLUniformLocation | null {
+    let place = this.#places.get(name);
+    if (place === undefined) {
+      place = this.#gl.getUniformLocation(this.#program, name);
+      this.#places.set(name, place);
+    }
+    return place;
+  }
+}
+
+/** A texture of one size and format for good; filtered between its pixels, not repeated. */
+export class Texture {
+  readonly texture: WebGLTexture;
+  readonly width: number;
+  readonly height: number;
+  readonly #gl: WebGL2RenderingContext;
+  readonly #format: number;
+
+  constructor(gl: WebGL2RenderingContext, channels: 1 | 2 | 4, width: number, height: number) {
+    this.#gl = gl;
+    [this.width, this.height] = [width, height];
+    this.texture = gl.createTexture();
+    this.#format = { 1: gl.RED, 2: gl.RG, 4: gl.RGBA }[channels];
+    gl.bindTexture(gl.TEXTURE_2D, this.texture);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, { 1: gl.R8, 2: gl.RG8, 4: gl.RGBA8 }[channels], width, height);
+    clampAndFilter(gl, gl.TEXTURE_2D);
+  }
+
+  upload(pixels: Uint8Array): void {
+    const gl = this.#gl;
+    gl.bindTexture(gl.TEXTURE_2D, this.texture);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, this.width, this.height, this.#format, gl.UNSIGNED_BYTE, pixels);
+  }
+
+  bind(unit: number): void {
+    this.#gl.activeTexture(this.#gl.TEXTURE0 + unit);
+    this.#gl.bindTexture(this.#gl.TEXTURE_2D, this.texture);
+  }
+
+  delete(): void {
+    this.#gl.deleteTexture(this.texture);
+  }
+}
+
+export function clampAndFilter(gl: WebGL2RenderingContext, target: number): void {
+  for (const axis of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(target, axis, gl.CLAMP_TO_EDGE);
+  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(target, filter, gl.LINEAR);
+}
+
+/** A target that draws into textures. */
+export function framebufferOf(gl: WebGL2RenderingContext, ...textures: Texture[]): WebGLFramebuffer {
+  const framebuffer = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+  const attachments = textures.map((_, i) => gl.COLOR_ATTACHMENT0 + i);
+  textures.forEach(({ texture }, i) => gl.framebufferTexture2D(gl.FRAMEBUFFER, attachments[i], gl.TEXTURE_2D, texture, 0));
+  gl.drawBuffers(attachments);
+  return framebuffer;
+}

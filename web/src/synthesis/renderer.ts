@@ -1,0 +1,155 @@
+/** Views of decoded frames, drawn by WebGL 2. */
+
+import type { Header } from "../container/header.ts";
+import { contributors, infinityOf, type Viewpoint } from "../geometry.ts";
+import boundsFragment from "./bounds.frag.glsl";
+import boundsVertex from "./bounds.vert.glsl";
+import { CameraTextures, SLOTS, type CameraFrame } from "./camera_textures.ts";
+import fullVertex from "./full.vert.glsl";
+import { framebufferOf, makeProgram, Texture, type Program } from "./gl.ts";
+import viewFragment from "./view.frag.glsl";
+
+/** What a view shows, in the order of `view.frag.glsl`. */
+export const LOOKS = ["picture", "disparity", "layers", "provenance", "disagreement"] as const;
+export type Look = (typeof LOOKS)[number];
+
+export interface ViewSettings {
+  readonly look: Look;
+  /** Cubic fetch; else linear, which is quicker. */
+  readonly fine: boolean;
+  /** How far the view stands ahead of the cameras' plane: 1 / the disparity of what it would touch, px from infinity. */
+  readonly dolly: number;
+  /** Which of red, green and blue are drawn. */
+  readonly mask?: readonly [boolean, boolean, boolean];
+}
+
+/** RGBA, rows from the top. */
+export interface Pixels {
+  readonly width: number;
+  readonly height: number;
+  readonly data: Uint8Array;
+}
+
+/** Part of a target: where a view is drawn, px from the lower left. */
+export interface Area {
+  readonly x: number;
+  readonly y: number;
+  readonly width: number;
+  readonly height: number;
+}
+
+export class ViewRenderer {
+  readonly gl: WebGL2RenderingContext;
+  readonly #header: Header;
+  readonly #cameras: CameraTextures;
+  readonly #bounds: Program;
+  readonly #view: Program;
+  readonly #near: Texture;
+  readonly #far: Texture;
+  readonly #boundsTarget: WebGLFramebuffer;
+
+  /** Throws Error where there is no WebGL 2. */
+  constructor(canvas: HTMLCanvasElement | OffscreenCanvas, header: Header) {
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" });
+    if (gl === null) throw new Error("this browser has no WebGL 2");
+    this.gl = gl as WebGL2RenderingContext;
+    this.#header = header;
+    this.#cameras = new CameraTextures(this.gl, header);
+    const [across, down] = this.#cameras.grid;
+    this.#near = new Texture(this.gl, 4, across, down);
+    this.#far = new Texture(this.gl, 4, across, down);
+    this.#boundsTarget = framebufferOf(this.gl, this.#near, this.#far);
+    this.#bounds = makeProgram(this.gl, boundsVertex, boundsFragment);
+    this.#view = makeProgram(this.gl, fullVertex, viewFragment);
+  }
+
+  /**
+   * Draw a view into an area of a framebuffer; null is the canvas.
+   *
+   * `frames` are those of the cell's cameras that have a picture; they are uploaded where they are new.
+   */
+  draw(frames: readonly CameraFrame[], view: Viewpoint, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
+    const at = (frame: CameraFrame, row: number, col: number) => frame.camera.row === row && frame.camera.col === col;
+    const seeing = contributors(this.#header, view, ({ row, col }) => frames.some((frame) => at(frame, row, col)));
+    const own = seeing.find(({ camera }) => camera.row === view.row && camera.col === view.col);
+    const used = own === undefined || settings.dolly !== 0 ? seeing : [own];
+    const layers = this.#cameras.place(used.map(({ camera }) => frames.find((frame) => at(frame, camera.row, camera.col))!));
+    const shifts = new Float32Array(2 * SLOTS);
+    const weights = new Float32Array(SLOTS);
+    used.forEach(({ shift, weight }, i) => {
+      shifts.set(shift, 2 * layers[i]);
+      weights[layers[i]] = weight;
+    });
+    this.#drawBounds(shifts, weights, settings);
+    this.#drawView(shifts, weights, settings, area, target);
+  }
+
+  /** A view's pixels at picture size. */
+  read(frames: readonly CameraFrame[], view: Viewpoint, settings: ViewSettings): Pixels {
+    const { gl } = this;
+    const { width, height } = this.#header;
+    const texture = new Texture(gl, 4, width, height);
+    const target = framebufferOf(gl, texture);
+    this.draw(frames, view, settings, { x: 0, y: 0, width, height }, target);
+    const data = new Uint8Array(4 * width * height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    gl.deleteFramebuffer(target);
+    texture.delete();
+    return { width, height, data };
+  }
+
+  #drawBounds(shifts: Float32Array, weights: Float32Array, settings: ViewSettings): void {
+    const { gl } = this;
+    const [across, down] = this.#cameras.grid;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#boundsTarget);
+    gl.viewport(0, 0, across, down);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.enable(gl.BLEND);
+    gl.blendEquation(gl.MAX);
+    this.#bounds.use();
+    this.#cameras.blocks.bind(0);
+    gl.uniform1i(this.#bounds.at("uBlocks"), 0);
+    gl.uniform2i(this.#bounds.at("uGrid"), across, down);
+    this.#describe(this.#bounds, shifts, weights, settings);
+    gl.drawArrays(gl.POINTS, 0, across * down * SLOTS);
+    gl.disable(gl.BLEND);
+  }
+
+  #drawView(shifts: Float32Array, weights: Float32Array, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
+    const { gl } = this;
+    const view = this.#view;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+    gl.viewport(area.x, area.y, area.width, area.height);
+    view.use();
+    this.#cameras.bind(0);
+    this.#near.bind(1);
+    this.#far.bind(2);
+    gl.uniform1i(view.at("uCameras"), 0);
+    gl.uniform1i(view.at("uNear"), 1);
+    gl.uniform1i(view.at("uFar"), 2);
+    this.#describe(view, shifts, weights, settings);
+    gl.uniform2i(view.at("uSize"), this.#header.width, this.#header.height);
+    gl.uniform4f(view.at("uArea"), area.x, area.y, area.width, area.height);
+    gl.uniform1i(view.at("uFromTop"), target === null ? 0 : 1);
+    gl.uniform1i(view.at("uLook"), LOOKS.indexOf(settings.look));
+    gl.uniform1i(view.at("uFine"), settings.fine ? 1 : 0);
+    gl.uniform1i(view.at("uSoftens"), weights.filter((weight) => weight > 0).length > 1 ? 1 : 0);
+    const [red, green, blue] = settings.mask ?? [true, true, true];
+    gl.colorMask(red, green, blue, true);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.colorMask(true, true, true, true);
+  }
+
+  /** What both passes must know of the cameras and the view. */
+  #describe(program: Program, shifts: Float32Array, weights: Float32Array, settings: ViewSettings): void {
+    const { gl } = this;
+    const { width, height, range } = this.#header;
+    gl.uniform2fv(program.at("uShift"), shifts);
+    gl.uniform4fv(program.at("uWeight"), weights);
+    gl.uniform2f(program.at("uRange"), ...range);
+    gl.uniform3f(program.at("uDolly"), settings.dolly, (width - 1) / 2, (height - 1) / 2);
+    gl.uniform1f(program.at("uInfinity"), infinityOf(this.#header));
+  }
+}
