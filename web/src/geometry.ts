@@ -45,10 +45,11 @@ export function cellRho(header: Header): number {
   return step.row && step.col ? (header.rho * step.row) / step.col : 1;
 }
 
-/** The nearest viewpoint between the outermost cameras. */
+/** The nearest viewpoint that can be shown: between the outermost cameras; without maps, a camera's own. */
 export function clampView(header: Header, view: Viewpoint): Viewpoint {
   const clamp = (value: number, most: number) => (Number.isFinite(value) ? Math.min(Math.max(value, 0), most) : 0);
-  return { row: clamp(view.row, header.rows - 1), col: clamp(view.col, header.cols - 1) };
+  const inside = { row: clamp(view.row, header.rows - 1), col: clamp(view.col, header.cols - 1) };
+  return header.mapCameras === "none" ? nearestCamera(header, inside) : inside;
 }
 
 /** What a pixel moves for each px of disparity, from a view to a camera. */
@@ -59,9 +60,11 @@ export function shiftTo(header: Header, view: Viewpoint, camera: Camera): [numbe
   return [across, cellRho(header) * down];
 }
 
-/** The real camera at a viewpoint, if one stands there. */
-export function cameraAt(header: Header, view: Viewpoint): Camera | undefined {
-  return cameras(header).find((camera) => camera.row === view.row && camera.col === view.col);
+/** The real camera nearest to a viewpoint. */
+export function nearestCamera(header: Header, view: Viewpoint): Camera {
+  const nearest = (places: readonly number[], value: number) =>
+    places.reduce((best, place) => (Math.abs(place - value) < Math.abs(best - value) ? place : best));
+  return { row: nearest(header.realRows, view.row), col: nearest(header.realCols, view.col) };
 }
 
 /** The span of neighbouring places that a coordinate lies in, the lower one on a border. */

@@ -4,8 +4,12 @@ import { checkLimit, FileError } from "./limits.ts";
 
 export type Codec = "h264" | "hevc" | "av1" | "vp9";
 
+export type MapCameras = "all" | "alternate" | "none";
+
 const CODECS: readonly Codec[] = ["h264", "hevc", "av1", "vp9"];
-const VERSION = 1;
+/** Version 2 adds files without maps. */
+const VERSIONS = [1, 2];
+const VERSION_WITHOUT_MAPS = 2;
 const MOST_SIDE = 1024;
 const MOST_PIXELS = 16384;
 
@@ -35,8 +39,8 @@ export interface Header {
   readonly range: readonly [number, number];
   /** 2: maps have half the pictures' size each way. */
   readonly mapScale: 1 | 2;
-  /** Only every second camera sends a map. */
-  readonly alternateMaps: boolean;
+  /** Which real cameras send a map. */
+  readonly mapCameras: MapCameras;
   /** As it stands in the file, for those who compare it. */
   readonly document: unknown;
 }
@@ -100,11 +104,11 @@ export function parseHeader(text: Uint8Array): Header {
   }
   const fields = new Fields(document, "");
   if (fields.get("format") !== "mvcodec") throw fields.wrong("format", fields.get("format"), '"mvcodec"');
-  const version = fields.get("version");
-  if (version !== VERSION) throw fields.wrong("version", version, `version ${VERSION}, which this player reads`);
+  const version = fields.get("version") as number;
+  if (!VERSIONS.includes(version)) throw fields.wrong("version", version, `version ${VERSIONS.join(" or ")}, which this player reads`);
   const codec = fields.get("codec") as Codec;
   if (!CODECS.includes(codec)) throw fields.wrong("codec", codec, CODECS.join(", "));
-  return { codec, ...readArray(fields.inner("array")), ...readMaps(fields), document };
+  return { codec, ...readArray(fields.inner("array")), ...readMaps(fields, version), document };
 }
 
 function readArray(array: Fields) {
@@ -138,18 +142,17 @@ function readCalibration(fields: Fields): Calibration {
   };
 }
 
-function readMaps(fields: Fields) {
+function readMaps(fields: Fields, version: number) {
   const range = fields.get("disparity_range_px");
   if (!isPair(range) || !(range[0] < range[1])) {
     throw fields.wrong("disparity_range_px", range, "[lo, hi] with lo < hi");
   }
   const mapScale = fields.get("disparity_scale", 1);
   if (mapScale !== 1 && mapScale !== 2) throw fields.wrong("disparity_scale", mapScale, "1 or 2");
-  const cameras = fields.get("disparity_cameras", "all");
-  if (cameras !== "all" && cameras !== "alternate") {
-    throw fields.wrong("disparity_cameras", cameras, '"all" or "alternate"');
-  }
-  return { range, mapScale, alternateMaps: cameras === "alternate" } as const;
+  const mapCameras = fields.get("disparity_cameras", "all") as MapCameras;
+  const known = version >= VERSION_WITHOUT_MAPS ? ["all", "alternate", "none"] : ["all", "alternate"];
+  if (!known.includes(mapCameras)) throw fields.wrong("disparity_cameras", mapCameras, known.join(", "));
+  return { range, mapScale, mapCameras } as const;
 }
 
 /** Equally spaced places from the first to the last. */

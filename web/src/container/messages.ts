@@ -35,8 +35,9 @@ export function topicOf(camera: Camera, kind: TrackKind): string {
 
 /** Whether a real camera sends a map: with alternate maps, those whose numbers have an even sum. */
 export function sendsMap(header: Header, camera: Camera): boolean {
+  if (header.mapCameras !== "alternate") return header.mapCameras === "all";
   const sum = header.realRows.indexOf(camera.row) + header.realCols.indexOf(camera.col);
-  return !header.alternateMaps || sum % 2 === 0;
+  return sum % 2 === 0;
 }
 
 /** Every video stream that the header announces: pictures, then maps, cameras in row order. */

@@ -27,11 +27,14 @@ export class FrameStore {
   readonly #planes = new Map<string, Planes>();
   readonly #maps = new WeakMap<Planes, Uint8Array>();
   readonly #told = new Set<string>();
+  readonly #flat: Uint8Array;
   #bytes = 0;
 
   constructor(recording: Recording, tell: Tell) {
     this.#recording = recording;
     this.#tell = tell;
+    const { width, height, mapScale } = recording.header;
+    this.#flat = new Uint8Array(Math.ceil(width / mapScale) * Math.ceil(height / mapScale));
   }
 
   /**
@@ -72,9 +75,10 @@ export class FrameStore {
     this.#planes.clear();
   }
 
-  /** Code values of a camera's map, cropped; derived where it sends none. */
+  /** Code values of a camera's map, cropped; derived where it sends none, and flat where none does. */
   async #map(camera: Camera, frame: number, isWanted: () => boolean): Promise<Uint8Array | undefined> {
     const { header } = this.#recording;
+    if (header.mapCameras === "none") return this.#flat;
     const senders = sendsMap(header, camera) ? [camera] : helpersOf(header, camera);
     const planes = await Promise.all(senders.map((sender) => this.planes(topicOf(sender, "disparity"), frame, isWanted)));
     const first = planes[0];

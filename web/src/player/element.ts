@@ -17,8 +17,17 @@ export class MvcodecPlayer extends HTMLElement {
   }
 
   connectedCallback(): void {
+    if (this.#ready !== undefined) return;
+    const embedded = this.hasAttribute("page") ? document.getElementById("recording") : null;
     const src = this.getAttribute("src");
-    if (src !== null && this.#ready === undefined) void this.open(src).catch(() => {});
+    if (embedded !== null) void this.#openEmbedded(embedded.textContent ?? "").catch(() => {});
+    else if (src !== null) void this.open(src).catch(() => {});
+  }
+
+  /** A recording that lies in the page itself, as base64. */
+  async #openEmbedded(text: string): Promise<void> {
+    const answer = await fetch(`data:application/octet-stream;base64,${text}`);
+    return this.open(await answer.blob());
   }
 
   /** Resolves when the first picture is on the screen. */

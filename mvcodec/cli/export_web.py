@@ -1,0 +1,117 @@
+"""``mvcodec export-web``: a page that shows a file, for any web server or to be mailed."""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import io
+import os
+from pathlib import Path
+
+from PIL import Image
+
+from mvcodec.array import Viewpoint
+from mvcodec.cli.arguments import add_output_options
+from mvcodec.cli.paths import local_path
+from mvcodec.cli.progress import progress
+from mvcodec.cli.safety import add_limits, limits_of
+from mvcodec.container.limits import Limits
+from mvcodec.container.reader import McapReader
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.errors import InputError, OutputError, SettingError
+from mvcodec.output.atomic import replacing, write_bytes
+from mvcodec.player.web_page import linked_page, page_files, single_page
+from mvcodec.synthesis.synthesizers import make_synthesizer
+
+RECORDING, POSTER = "video.mcap", "poster.jpg"
+POSTER_QUALITY = 85
+POSTER_SYNTHESIZER = "quick"
+
+MOST_SINGLE_BYTES = 256 << 20
+"""A page with a larger file in it takes browsers too much memory to open."""
+
+_BLOCK_BYTES = 1 << 20
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``export-web``."""
+    parser.add_argument("input", type=local_path, metavar="IN.mcap", help="the file to show")
+    parser.add_argument(
+        "output", type=local_path, metavar="OUTDIR", help="a folder; made where it is missing"
+    )
+    parser.add_argument(
+        "--single-file", action="store_true", help="one HTML with everything in it, which opens from disk"
+    )
+    parser.add_argument("--title", metavar="T", help="of the page (default: the file's name)")
+    parser.add_argument("--poster", action="store_true", help="show a picture while the file is loaded")
+    add_limits(parser)
+    add_output_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Write the page."""
+    source: Path = arguments.input
+    folder: Path = arguments.output
+    limits = limits_of(arguments)
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(folder, "it is a file")
+    if (folder / RECORDING).resolve() == source.resolve():
+        raise SettingError("OUTDIR", folder, "another folder than the file's")
+    with McapReader.open(source, limits):  # what is no file of ours is told before anything is written
+        pass
+    title = source.stem if arguments.title is None else arguments.title
+    poster = _poster(source, limits) if arguments.poster else None
+    if arguments.single_file:
+        written = _write_single(source, folder, title, poster)
+    else:
+        written = _write_site(source, folder, title, poster, quiet=arguments.quiet)
+    if not arguments.quiet:
+        print(f"{folder}: {', '.join(written)}")
+
+
+def _write_single(source: Path, folder: Path, title: str, poster: bytes | None) -> list[str]:
+    size = source.stat().st_size
+    if size > MOST_SINGLE_BYTES:
+        raise InputError(source, f"{size} bytes", f"at most {MOST_SINGLE_BYTES} with --single-file")
+    url = None if poster is None else f"data:image/jpeg;base64,{base64.b64encode(poster).decode()}"
+    write_bytes(folder / "index.html", single_page(title, source.read_bytes(), url).encode())
+    return ["index.html, which opens from disk"]
+
+
+def _write_site(source: Path, folder: Path, title: str, poster: bytes | None, *, quiet: bool) -> list[str]:
+    """Whatever breaks off leaves no page that lacks a part: `index.html` comes last."""
+    names = [name for name in page_files() if name != "index.html"]
+    for name in names:
+        write_bytes(folder / name, page_files()[name])
+    if poster is not None:
+        write_bytes(folder / POSTER, poster)
+    _copy(source, folder / RECORDING, quiet=quiet)
+    page = linked_page(title, RECORDING, None if poster is None else POSTER)
+    write_bytes(folder / "index.html", page.encode())
+    return ["index.html", *names, RECORDING, *([POSTER] if poster is not None else [])]
+
+
+def _copy(source: Path, target: Path, *, quiet: bool) -> None:
+    with (
+        source.open("rb") as file,
+        replacing(target) as part,
+        part.open("wb") as out,
+        progress("copy", os.fstat(file.fileno()).st_size, quiet=quiet, unit="B") as bar,
+    ):
+        while block := file.read(_BLOCK_BYTES):
+            out.write(block)
+            bar.update(len(block))
+
+
+def _poster(source: Path, limits: Limits) -> bytes:
+    """The first frame from the middle of the array, as JPEG."""
+    with Decoder.open(source, slice(0, 1), "skip", limits) as decoder:
+        decoded = next(iter(decoder), None)
+    if decoded is None:
+        raise InputError(source, "no frame set that can be decoded", "one for the poster")
+    array = decoded.array
+    middle = Viewpoint((array.rows - 1) / 2, (array.cols - 1) / 2)
+    picture = make_synthesizer(POSTER_SYNTHESIZER).render(decoded, middle).pixels
+    room = io.BytesIO()
+    Image.fromarray(picture).save(room, "JPEG", quality=POSTER_QUALITY)
+    return room.getvalue()

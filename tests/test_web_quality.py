@@ -1,0 +1,108 @@
+"""Pictures of the page, read back from Chromium: as good as the library's own synthesizers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser_page import CHROMIUM, NO_CHROMIUM
+from player_files import encode, write_original
+from playwright.sync_api import Page
+from web_fixtures import Site, open_player, pixels_of
+
+from mvcodec.array import Viewpoint
+from mvcodec.capture import open_input
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.evaluation.metrics import psnr
+from mvcodec.frames import DecodedSet, FrameSet, Picture
+from mvcodec.synthesis.synthesizers import make_synthesizer
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
+pytest_plugins = ("web_fixtures",)
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
+BELOW_DB = {"quick": 0.5, "layered": 1.0}
+"""How far the page's mean over the views may lie below a synthesizer's."""
+
+
+def first_of(file: Path) -> DecodedSet:
+    with Decoder.open(file, slice(0, 1)) as decoder:
+        (decoded,) = decoder
+    return decoded
+
+
+def original_of(folder: Path) -> FrameSet:
+    return next(iter(open_input([folder], real="all").frame_sets()))
+
+
+def view_of(page: Page, row: float, col: float) -> Picture:
+    page.evaluate("([row, col]) => document.querySelector('mvcodec-player').look(row, col)", [row, col])
+    return pixels_of(page)
+
+
+def check_against_synthesizers(
+    page: Page, site: Site, file: Path, original: FrameSet, views: Sequence[tuple[int, int]]
+) -> None:
+    decoded = first_of(file)
+    site.put(file.name, file.read_bytes())
+    open_player(page, site, file.name)
+    mean = np.mean([psnr(original.pictures[view], view_of(page, *view)) for view in views])
+    for name, below_db in BELOW_DB.items():
+        synthesizer = make_synthesizer(name)
+        pictures = [synthesizer.render(decoded, Viewpoint(*view)).pixels for view in views]
+        theirs = np.mean(
+            [psnr(original.pictures[view], picture) for view, picture in zip(views, pictures, strict=True)]
+        )
+        assert mean > theirs - below_db, name
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A small array folder and its coded file."""
+    folder = tmp_path_factory.mktemp("room")
+    original = write_original(folder / "room", frames=2)
+    return original, encode(original, folder / "room.mcap")
+
+
+def test_virtual_views_are_as_good_as_the_librarys(tab: Page, site: Site, room: tuple[Path, Path]) -> None:
+    original, file = room
+    check_against_synthesizers(tab, site, file, original_of(original), [(1, 1), (0, 1), (1, 0)])
+
+
+def test_a_viewpoint_on_a_real_camera_shows_that_camera(
+    tab: Page, site: Site, room: tuple[Path, Path]
+) -> None:
+    decoded = first_of(room[1])
+    site.put("room.mcap", room[1].read_bytes())
+    open_player(tab, site, "room.mcap")
+    for camera, picture in decoded.pictures.items():
+        found = view_of(tab, *camera)
+        assert psnr(picture, found) > 45  # chroma between its samples is the decoder's business
+        difference = picture.astype(int) - found
+        assert abs(difference.mean(axis=(0, 1))).max() < 0.3  # no shift of any colour
+
+
+def test_the_same_view_has_the_same_pixels_every_time(tab: Page, site: Site, room: tuple[Path, Path]) -> None:
+    site.put("room.mcap", room[1].read_bytes())
+    open_player(tab, site, "room.mcap")
+    first = view_of(tab, 0.8, 1.3)
+    view_of(tab, 2, 0)
+    assert np.array_equal(view_of(tab, 0.8, 1.3), first)
+
+
+@pytest.mark.slow
+@pytest.mark.shared_data
+@pytest.mark.parametrize("name", ["shop_v3", "shop_v4"])
+def test_real_arrays_are_as_good_as_the_librarys(tab: Page, site: Site, tmp_path: Path, name: str) -> None:
+    if not (DATA / name).is_dir():
+        pytest.skip(f"no {DATA / name}")
+    tab.set_default_timeout(0)
+    from mvcodec.cli.main import main
+
+    file = tmp_path / f"{name}.mcap"
+    assert main(["encode", str(DATA / name), str(file), "--frames", "0:1", "--quiet"]) == 0
+    array = open_input([DATA / name]).array
+    views = [view for view in array.positions if view not in array.real]
+    check_against_synthesizers(tab, site, file, original_of(DATA / name), views)

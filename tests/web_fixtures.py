@@ -1,0 +1,150 @@
+"""Fixtures of the tests of the page that needs no server behind it: a plain web server, and Chromium."""
+
+from __future__ import annotations
+
+import base64
+import re
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser_page import ARGUMENTS, CHROMIUM
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from mvcodec.frames import Picture
+from mvcodec.player.web_page import page_files
+
+
+@dataclass
+class Site:
+    """A folder behind a web server that knows nothing but files and ranges of them.
+
+    Attributes:
+        ranges: (name, start, end) of each request for a part, end exclusive.
+    """
+
+    folder: Path
+    url: str = ""
+    ranges: list[tuple[str, int, int]] = field(default_factory=list)
+    has_ranges: bool = True
+
+    def put(self, name: str, content: bytes) -> str:
+        """Serve a file; returns its address."""
+        (self.folder / name).write_bytes(content)
+        return f"{self.url}/{name}"
+
+
+def serve_folder(folder: Path) -> Iterator[Site]:
+    """Serve until the generator is closed."""
+    site = Site(folder)
+
+    class Handler(SimpleHTTPRequestHandler):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments, directory=str(folder))
+
+        def do_GET(self) -> None:
+            path = Path(self.translate_path(self.path))
+            wanted = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
+            if wanted is None or not site.has_ranges or not path.is_file():
+                super().do_GET()
+                return
+            size = path.stat().st_size
+            start, end = int(wanted[1]), min(int(wanted[2]) + 1, size)
+            if start >= size:
+                self.send_error(416)
+                return
+            site.ranges.append((path.name, start, end))
+            self.send_response(206)
+            self.send_header("Content-Range", f"bytes {start}-{end - 1}/{size}")
+            self.send_header("Content-Length", str(end - start))
+            self.end_headers()
+            with path.open("rb") as file:
+                file.seek(start)
+                self.wfile.write(file.read(end - start))
+
+        def log_message(self, *_arguments: Any) -> None:
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    site.url = f"http://127.0.0.1:{server.server_address[1]}"
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    try:
+        yield site
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """The built page's files behind a plain web server, with room for recordings."""
+    folder = tmp_path_factory.mktemp("site")
+    for name, content in page_files().items():
+        (folder / name).write_bytes(content)
+    (folder / "blank.html").write_text('<!doctype html><meta charset="utf-8"><title>blank</title>')
+    yield from serve_folder(folder)
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=CHROMIUM, args=list(ARGUMENTS))
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def tab(chromium: Browser) -> Iterator[Page]:
+    """A page whose errors fail the test, and whose requests must stay on this machine."""
+    page = chromium.new_page(viewport={"width": 960, "height": 600})
+    troubles: list[str] = []
+    page.on("pageerror", lambda error: troubles.append(str(error)))
+    page.on("request", lambda request: troubles.append(request.url) if _is_foreign(request.url) else None)
+    yield page
+    page.close()
+    assert troubles == []
+
+
+def _is_foreign(url: str) -> bool:
+    return not url.startswith(
+        ("http://127.0.0.1:", "ws://127.0.0.1:", "blob:", "data:", "file:///", "about:")
+    )
+
+
+def pixels_of(page: Page, selector: str = "mvcodec-player") -> Picture:
+    """What the player's `pixels()` gives, as RGB."""
+    width, height, data = page.evaluate(
+        """(selector) => {
+            const { width, height, data } = document.querySelector(selector).pixels();
+            let text = "";
+            for (let i = 0; i < data.length; i += 32768) {
+                text += String.fromCharCode(...data.subarray(i, i + 32768));
+            }
+            return [width, height, btoa(text)];
+        }""",
+        selector,
+    )
+    return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4)[..., :3]
+
+
+def open_player(page: Page, site: Site, recording: str, attributes: str = "") -> None:
+    """An element for a recording on a page of its own, with its first picture on the screen."""
+    page.goto(f"{site.url}/blank.html")
+    page.evaluate(
+        """async ([recording, attributes]) => {
+            await import("./player.js");
+            document.body.innerHTML = `<mvcodec-player src="${recording}" ${attributes}></mvcodec-player>`;
+            window.troubles = [];
+            const player = document.querySelector("mvcodec-player");
+            player.addEventListener("error", (event) => window.troubles.push(event.detail.message));
+            await player.ready;
+        }""",
+        [recording, attributes],
+    )
