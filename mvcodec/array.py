@@ -21,6 +21,9 @@ Position = tuple[int, int]
 NOMINAL_BASELINE_M = 0.1
 MAX_GRID_SIDE = 1024
 MAX_PICTURE_SIDE = 16384
+MIN_FPS, MAX_FPS = 1e-6, 1e6
+"""A picture in twelve days, and more than any camera takes: what codecs and containers can say."""
+
 LISTED_SIDE = 32
 """Up to here a message lists rows (columns) one by one."""
 
@@ -136,9 +139,10 @@ class CameraArray:
         ):
             if not 1 <= value <= top:
                 raise SettingError(f"array.{name}", value, f"1..{top}")
-        for name, number in (("fps", self.fps), ("rho", self.rho)):
-            if not (math.isfinite(number) and number > 0):
-                raise SettingError(f"array.{name}", number, "a positive number")
+        if not MIN_FPS <= self.fps <= MAX_FPS:
+            raise SettingError("array.fps", self.fps, f"{MIN_FPS:g}..{MAX_FPS:g}")
+        if not (math.isfinite(self.rho) and self.rho > 0):
+            raise SettingError("array.rho", self.rho, "a positive number")
         _check_real("rows", self.real_rows, self.rows)
         _check_real("cols", self.real_cols, self.cols)
         if self.cols == 1 and self.rho != 1.0:

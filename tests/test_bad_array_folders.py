@@ -29,6 +29,8 @@ from mvcodec.errors import InputError, MvCodecWarning, SettingError
         ({"fps": "fast"}, "fps = 'fast'"),
         ({"fps": float("nan")}, "fps = nan"),
         ({"fps": 10**400}, "fps = 1"),
+        ({"fps": 1e-9}, r"fps = 1e-09, expected 1e-06\.\.1e\+06"),
+        ({"fps": 1e9}, r"fps = 1000000000\.0, expected 1e-06\.\.1e\+06"),
         ({"name": 5}, "name = 5, expected a text"),
         ({"rho": -1}, "rho = -1"),
         ({"views": None}, "neither views nor pattern"),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import get_args
 
-from mvcodec.array import Calibration
+from mvcodec.array import MAX_FPS, MIN_FPS, Calibration
 from mvcodec.container.recorded_pictures import Clock
 from mvcodec.errors import SettingError
 
@@ -49,8 +49,8 @@ class RecordingSettings:
             raise SettingError("topics", f"rows of {sorted(widths)} topics", "rows of one length")
         if len(set(names)) != len(names):
             raise SettingError("topics", "a topic twice", "each topic once")
-        if self.fps is not None and not 0 < self.fps <= 1000:
-            raise SettingError("fps", self.fps, "more than 0, at most 1000")
+        if self.fps is not None and not MIN_FPS <= self.fps <= MAX_FPS:
+            raise SettingError("fps", self.fps, f"{MIN_FPS:g}..{MAX_FPS:g}")
         if self.tolerance_ms is not None and not 0 <= self.tolerance_ms <= 10_000:
             raise SettingError("tolerance_ms", self.tolerance_ms, "0..10000 ms")
         if self.clock not in get_args(Clock):

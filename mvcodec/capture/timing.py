@@ -7,12 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from mvcodec.array import MAX_FPS, MIN_FPS
 from mvcodec.capture.pairing import typical_step_ns
 from mvcodec.errors import SettingError
-
-MAX_FPS = 1000.0
-MIN_FPS = 1e-6
-"""A picture in twelve days: more than that is a slip."""
 
 _STANDARD_RATES = tuple(
     Fraction(rate * 1000, divisor)

@@ -190,11 +190,11 @@ def _open_sink(form: str, arguments: argparse.Namespace, plan: OutputPlan, outpu
         return lambda decoded, views: mcap.push(_pictures(views), decoded.index, decoded.time_ns)
     writer = outputs.enter_context(open_form(form, target, plan))
     if not arguments.provenance:
-        return lambda _, views: writer.push(_pictures(views))
+        return lambda decoded, views: writer.push(_pictures(views), decoded.time_ns)
     provenance = ProvenanceWriter(target, plan.names)
 
-    def push(_: DecodedSet, views: list[RenderedView]) -> None:
-        writer.push(_pictures(views))
+    def push(decoded: DecodedSet, views: list[RenderedView]) -> None:
+        writer.push(_pictures(views), decoded.time_ns)
         provenance.push(views)
 
     return push

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator
 from itertools import chain, repeat
 from pathlib import Path
 
@@ -27,9 +28,9 @@ from mvcodec.container import McapReader
 from mvcodec.container.limits import Limits
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import SettingError, StreamError
-from mvcodec.frames import Picture
+from mvcodec.frames import DecodedSet, Picture
 from mvcodec.output.light_field import quilt_path
-from mvcodec.output.picture_file import STILL_SUFFIX, WRITERS, find_writer
+from mvcodec.output.picture_file import STILL_SUFFIX, WRITERS, at_rate, find_writer
 from mvcodec.output.styles import STYLES, ShotSettings, take
 from mvcodec.output.view_path import FILE_SUFFIX, SHAPES, read_waypoints, walk_shape, walk_waypoints
 from mvcodec.synthesis.synthesizers import make_synthesizer
@@ -106,9 +107,12 @@ def run(arguments: argparse.Namespace) -> None:
         if arguments.style == QUILT and shot.grid is not None:
             output = quilt_path(output, *shot.grid, array.width / array.height)
         times = repeat(first) if count == 1 else chain([first], sets)
-        moments = ((decoded, place) for place, decoded in zip(places, times, strict=False))
+        stamps: deque[int] = deque()
+        moments = _stamped(zip(places, times, strict=False), stamps)
         with progress("render", len(places), quiet=arguments.quiet, unit="picture") as bar:
-            write(output, _counted(take(shot, moments, synthesizer), bar), array.fps)
+            pictures = _counted(take(shot, moments, synthesizer), bar)
+            timed = ((picture, stamps.popleft()) for picture in pictures)
+            write(output, at_rate(pictures, array.fps) if count == 1 else timed, array.fps)
     if output != arguments.output and not arguments.quiet:
         print(output)
 
@@ -148,6 +152,15 @@ def _frame_count(arguments: argparse.Namespace, limits: Limits) -> int:
 
 def _say_nothing(_: StreamError) -> None:
     pass
+
+
+def _stamped(
+    moments: Iterable[tuple[Viewpoint, DecodedSet]], stamps: deque[int]
+) -> Iterator[tuple[DecodedSet, Viewpoint]]:
+    """The moments; their times wait in `stamps` until the pictures are made."""
+    for place, decoded in moments:
+        stamps.append(decoded.time_ns)
+        yield decoded, place
 
 
 def _counted(pictures: Iterator[Picture], bar: tqdm[None]) -> Iterator[Picture]:

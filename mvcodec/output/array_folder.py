@@ -95,12 +95,16 @@ class ArrayFolderWriter:
     def __init__(self, folder: Path, facts: ArrayFacts) -> None:
         self.folder, self.facts = folder, facts
         self.frame_count = 0
+        self._times_ns: list[int] = []
         self._positions = {(row, col) for row in range(facts.rows) for col in range(facts.cols)}
         self._with_truth: set[Position] = set()
         self._closed = False
 
     def push(
-        self, pictures: Mapping[Position, Picture], truth: Mapping[Position, FloatMap] | None = None
+        self,
+        pictures: Mapping[Position, Picture],
+        truth: Mapping[Position, FloatMap] | None = None,
+        time_ns: int | None = None,
     ) -> None:
         """Write the next frame set.
 
@@ -108,6 +112,7 @@ class ArrayFolderWriter:
             pictures: uint8 (H, W, 3) RGB of every view of the grid.
             truth: float32 (H, W) px for one grid step, by view; not finite where unknown. The same
                 views in each frame set.
+            time_ns: when they were taken; `array.json` says so where that isn't at a constant rate.
 
         Raises:
             StreamClosed: after `close`.
@@ -131,7 +136,11 @@ class ArrayFolderWriter:
         settle(jobs)
         for job in jobs:
             job.result()
+        self._times_ns.append(self._steady_ns(number) if time_ns is None else time_ns)
         self.frame_count += 1
+
+    def _steady_ns(self, number: int) -> int:
+        return round((self.facts.first_frame + number) * 1e9 / self.facts.fps)
 
     def _check(self, pictures: Mapping[Position, Picture], truth: Mapping[Position, FloatMap]) -> None:
         if self._closed:
@@ -162,6 +171,8 @@ class ArrayFolderWriter:
         if not self.frame_count:
             raise OutputError(self.folder, "an array without a frame set")
         files: dict[str, Any] = {"pattern": PICTURE_PATTERN, "frames": self.frame_count}
+        if self._times_ns != [self._steady_ns(number) for number in range(self.frame_count)]:
+            files["times_ns"] = self._times_ns
         if self._with_truth:
             files["truth"] = {
                 view_name(view): {"file": _truth_pattern(view), "scale": 1.0, "steps": 1}

@@ -64,8 +64,11 @@ class OutputPlan:
 class ViewWriter(Protocol):
     """Takes the pictures of each frame in the plan's order. An error inside `with` aborts it."""
 
-    def push(self, pictures: Sequence[Picture]) -> None:
+    def push(self, pictures: Sequence[Picture], time_ns: int | None = None) -> None:
         """Write uint8 (H, W, 3) RGB, one for each viewpoint of the plan.
+
+        Args:
+            time_ns: when they were taken; None: one step of the frame rate after those before.
 
         Raises:
             OutputError: the system refuses.
@@ -95,9 +98,9 @@ class ArrayForm:
         self._positions = [(row, col) for row in range(facts.rows) for col in range(facts.cols)]
         self._writer = ArrayFolderWriter(target, facts)
 
-    def push(self, pictures: Sequence[Picture]) -> None:
+    def push(self, pictures: Sequence[Picture], time_ns: int | None = None) -> None:
         """See ViewWriter."""
-        self._writer.push(dict(zip(self._positions, pictures, strict=True)))
+        self._writer.push(dict(zip(self._positions, pictures, strict=True)), time_ns=time_ns)
 
     def close(self) -> None:
         """Write `array.json`."""
@@ -113,13 +116,13 @@ class ArrayForm:
 
 
 class PictureForm(Closing):
-    """A folder of numbered PNG pictures for each viewpoint: ``r00_c00/000000.png``."""
+    """A folder of numbered PNG pictures, which say no times, for each viewpoint: ``r00_c00/000000.png``."""
 
     def __init__(self, target: Path, plan: OutputPlan) -> None:
         self._folders = [target / name for name in plan.names]
         self._count = 0
 
-    def push(self, pictures: Sequence[Picture]) -> None:
+    def push(self, pictures: Sequence[Picture], time_ns: int | None = None) -> None:  # noqa: ARG002
         """See ViewWriter."""
         paths = [folder / f"{self._count:06d}.png" for folder in self._folders]
         run_all(write_png, paths, pictures)
@@ -141,9 +144,9 @@ class VideoForm:
             ]
             self._resources = stack.pop_all()
 
-    def push(self, pictures: Sequence[Picture]) -> None:
+    def push(self, pictures: Sequence[Picture], time_ns: int | None = None) -> None:
         """See ViewWriter."""
-        run_all(Mp4Writer.push, self._writers, pictures)
+        run_all(Mp4Writer.push, self._writers, pictures, [time_ns] * len(self._writers))
 
     def close(self) -> None:
         """Finish every file."""
@@ -173,7 +176,7 @@ class MosaicForm:
         self._video: Mp4Writer | None = None
         self._count, self._closed = 0, False
 
-    def push(self, pictures: Sequence[Picture]) -> None:
+    def push(self, pictures: Sequence[Picture], time_ns: int | None = None) -> None:
         """See ViewWriter. After the first frame a PNG takes no more of them."""
         if self._closed:
             raise StreamClosed(f"{self._target} is closed")
@@ -186,7 +189,7 @@ class MosaicForm:
             return
         if self._video is None:
             self._video = Mp4Writer(self._target, whole.shape[1], whole.shape[0], self._fps)
-        self._video.push(whole)
+        self._video.push(whole, time_ns)
 
     def _arranged(self, pictures: Sequence[Picture]) -> list[list[Picture]]:
         rows, cols = self._layout

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from PIL import Image
 
-from mvcodec.errors import OutputError, SettingError
+from mvcodec.errors import MvCodecWarning, OutputError, SettingError
 from mvcodec.frames import Picture
 from mvcodec.output.atomic import replacing
 from mvcodec.output.pictures import write_png
@@ -26,44 +28,73 @@ GIF_TICKS = 100
 MIN_GIF_TICKS = 2
 """Browsers show shorter pictures for ten."""
 
-PictureWriter = Callable[[Path, Iterator[Picture], float], None]
+MAX_GIF_TICKS = (1 << 16) - 1
+MAX_WEBP_MS = (1 << 24) - 1
+"""How long a picture can be shown, by the fields of these formats."""
+
+Timed = Iterator[tuple[Picture, int]]
+"""uint8 (H, W, 3) RGB pictures of one size, each with its time, ns, ascending."""
+
+PictureWriter = Callable[[Path, Timed, float], None]
 
 
-def _write_mp4(path: Path, pictures: Iterator[Picture], fps: float) -> None:
+def at_rate(pictures: Iterable[Picture], fps: float) -> Timed:
+    """Pictures with the times of a constant rate."""
+    for number, picture in enumerate(pictures):
+        yield picture, round(number * 1e9 / fps)
+
+
+def _write_mp4(path: Path, pictures: Timed, fps: float) -> None:
     with ExitStack() as stack:
         writer: Mp4Writer | None = None
-        for picture in pictures:
+        for picture, time_ns in pictures:
             if writer is None:
                 writer = stack.enter_context(Mp4Writer(path, picture.shape[1], picture.shape[0], fps))
-            writer.push(picture)
+            writer.push(picture, time_ns)
 
 
-def _write_still(path: Path, pictures: Iterator[Picture], _fps: float) -> None:
-    for picture in pictures:
+def _write_still(path: Path, pictures: Timed, _fps: float) -> None:
+    for picture, _ in pictures:
         write_png(path, picture)
         return
 
 
-def _write_webp(path: Path, pictures: Iterator[Picture], fps: float) -> None:
-    images = [Image.fromarray(picture) for picture in _bounded(path, pictures)]
+def _write_webp(path: Path, pictures: Timed, fps: float) -> None:
+    images: list[Image.Image] = []
+    times_ns: list[int] = []
+    for picture, time_ns in _bounded(path, pictures):
+        images.append(Image.fromarray(picture))
+        times_ns.append(time_ns)
     if images:
+        steps = [(after - before) / 1e6 for before, after in pairwise([*times_ns, times_ns[-1] + 1e9 / fps])]
         # Pillow sums the durations up before it rounds to ms.
-        _save(path, images, [1000 / fps] * len(images), quality=WEBP_QUALITY, method=WEBP_METHOD)
+        _save(path, images, _clipped(path, steps, MAX_WEBP_MS), quality=WEBP_QUALITY, method=WEBP_METHOD)
 
 
-def _write_gif(path: Path, pictures: Iterator[Picture], fps: float) -> None:
+def _write_gif(path: Path, pictures: Timed, fps: float) -> None:
     images: list[Image.Image] = []
     starts: list[int] = []
-    end = 0
-    for number, picture in enumerate(_bounded(path, pictures)):
-        start, end = round(GIF_TICKS * number / fps), round(GIF_TICKS * (number + 1) / fps)
+    first_ns, end = None, 0
+    for picture, time_ns in _bounded(path, pictures):
+        first_ns = time_ns if first_ns is None else first_ns
+        start = round(GIF_TICKS * (time_ns - first_ns) / 1e9)
+        end = round(GIF_TICKS * ((time_ns - first_ns) / 1e9 + 1 / fps))
         if not starts or start - starts[-1] >= MIN_GIF_TICKS:
             starts.append(start)
             images.append(_paletted(picture))
     if images:
         ends = [*starts[1:], max(end, starts[-1] + MIN_GIF_TICKS)]
-        durations = [1000 / GIF_TICKS * (after - start) for start, after in zip(starts, ends, strict=True)]
-        _save(path, images, durations)
+        tick_ms = 1000 / GIF_TICKS
+        durations = [tick_ms * (after - start) for start, after in zip(starts, ends, strict=True)]
+        _save(path, images, _clipped(path, durations, MAX_GIF_TICKS * tick_ms))
+
+
+def _clipped(path: Path, durations_ms: list[float], longest_ms: float) -> list[float]:
+    """The durations as the format can hold them; what is cut off is told."""
+    if max(durations_ms) > longest_ms:
+        text = f"{path}: pictures are shown for {longest_ms / 1000:g} s at most, the longest that it can hold"
+        warnings.warn(f"{text}; .mp4 has no such limit", MvCodecWarning, stacklevel=4)
+    return [min(duration, longest_ms) for duration in durations_ms]
 
 
 WRITERS: dict[str, PictureWriter] = {
@@ -72,7 +103,7 @@ WRITERS: dict[str, PictureWriter] = {
     ".gif": _write_gif,
     ".webp": _write_webp,
 }
-"""By the file's ending: (path, uint8 (H, W, 3) RGB pictures of one size, pictures a second)."""
+"""By the file's ending: (path, pictures, nominal pictures a second: the last one lasts one of them)."""
 
 
 def find_writer(path: Path) -> PictureWriter:
@@ -89,14 +120,14 @@ def find_writer(path: Path) -> PictureWriter:
     return WRITERS[suffix]
 
 
-def _bounded(path: Path, pictures: Iterator[Picture]) -> Iterator[Picture]:
+def _bounded(path: Path, pictures: Timed) -> Timed:
     total = 0
-    for picture in pictures:
+    for picture, time_ns in pictures:
         total += picture.shape[0] * picture.shape[1]
         if total > MAX_ANIMATION_PX:
             held = MAX_ANIMATION_PX // (picture.shape[0] * picture.shape[1])
             raise OutputError(path, f"more than {held} such pictures don't fit; .mp4 takes any number")
-        yield picture
+        yield picture, time_ns
 
 
 def _paletted(picture: Picture) -> Image.Image:

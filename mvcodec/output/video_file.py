@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import ExitStack
 from fractions import Fraction
 from pathlib import Path
@@ -34,11 +35,20 @@ _EXACT = (
     | Interpolation.FULL_CHR_H_INT
 )
 _MAX_RATE_DENOMINATOR = 1001
+_TICKS = 10_000
+"""A second's at least: what times are rounded to."""
+
+_STEP_TICKS = 1 << 24
+"""From picture to picture at the nominal rate, at most: slower rates have fewer ticks a second."""
+
+_MAX_STEP_TICKS = 1 << 28
+"""From picture to picture, as FFmpeg can say it in MP4; longer pauses are shortened to that."""
 
 
 class Mp4Writer:
     """Writes pictures of one view as H.264, yuv420p, BT.709 limited range (tagged), in MP4.
 
+    Pictures are shown from their own times on, the first at 0, or at a constant rate where they have none.
     Odd sizes are padded by one column or row, repeated from the last: 4:2:0 has no odd ones.
     The file appears at `path` when the writer is closed; after an error there is none.
 
@@ -54,33 +64,40 @@ class Mp4Writer:
 
     def __init__(self, path: Path, width: int, height: int, fps: float, *, crf: float = DEFAULT_CRF) -> None:
         self.path, self._size = path, (width, height)
+        self._rate = steady_fraction(fps)
+        # A whole number of ticks for a picture of the nominal rate.
+        ticks = min(_TICKS, math.ceil(_STEP_TICKS * self._rate))
+        self._ticks = self._rate.numerator * math.ceil(ticks / self._rate.numerator)
+        self._first_ns = self._last_ticks = 0
         self._reformatter, self._count, self._closed = VideoReformatter(), 0, False
         with ExitStack() as stack:
             part = stack.enter_context(replacing(path))
             try:
-                self._container = av.open(
-                    str(part), "w", format="mp4", container_options={"movflags": "+faststart"}
-                )
+                options = {"movflags": "+faststart", "video_track_timescale": str(self._ticks)}
+                self._container = av.open(f"file:{part}", "w", format="mp4", container_options=options)
                 stack.callback(self._container.close)
-                self._stream = self._add_stream(fps, crf)
+                self._stream = self._add_stream(crf)
             except av.error.FFmpegError as error:
                 raise OutputError(path, error.strerror or error) from None
             self._resources = stack.pop_all()
 
-    def _add_stream(self, fps: float, crf: float) -> VideoStream:
-        rate = Fraction(fps).limit_denominator(_MAX_RATE_DENOMINATOR)
-        stream = self._container.add_stream("libx264", rate=rate, options={"crf": f"{crf:g}"})
+    def _add_stream(self, crf: float) -> VideoStream:
+        stream = self._container.add_stream("libx264", rate=self._rate, options={"crf": f"{crf:g}"})
         stream.width, stream.height = (side + side % 2 for side in self._size)
         stream.pix_fmt = "yuv420p"
         context = stream.codec_context
+        context.time_base = Fraction(1, self._ticks)
         context.colorspace = Colorspace.ITU709
         context.color_range = ColorRange.MPEG
         context.color_primaries = ColorPrimaries.BT709
         context.color_trc = ColorTrc.BT709
         return stream
 
-    def push(self, picture: Picture) -> None:
+    def push(self, picture: Picture, time_ns: int | None = None) -> None:
         """Append uint8 (H, W, 3) RGB of the size given at the start.
+
+        Args:
+            time_ns: when it was taken, ascending; None: one step of the rate after the one before.
 
         Raises:
             StreamClosed: after `close`.
@@ -101,9 +118,20 @@ class Mp4Writer:
             dst_color_range=ColorRange.MPEG,
             interpolation=_EXACT,
         )
-        frame.pts, self._count = self._count, self._count + 1
-        frame.time_base = 1 / Fraction(self._stream.codec_context.framerate)
+        frame.pts, frame.time_base = self._next_ticks(time_ns), Fraction(1, self._ticks)
+        frame.duration = round(self._ticks / self._rate)
+        self._count += 1
         self._mux(frame)
+
+    def _next_ticks(self, time_ns: int | None) -> int:
+        if not self._count:
+            self._first_ns = time_ns or 0
+            return 0
+        step = round(self._ticks / self._rate)
+        if time_ns is not None:
+            step = round(Fraction(time_ns - self._first_ns, 10**9) * self._ticks) - self._last_ticks
+        self._last_ticks += min(max(step, 1), _MAX_STEP_TICKS)
+        return self._last_ticks
 
     def _mux(self, frame: VideoFrame | None) -> None:
         try:
@@ -141,6 +169,13 @@ class Mp4Writer:
             self.close()
         else:
             self.abort()
+
+
+def steady_fraction(fps: float) -> Fraction:
+    """A frame rate as files say it: 30000/1001 and such are exact, and slow ones are not 0."""
+    if fps >= 1:
+        return Fraction(fps).limit_denominator(_MAX_RATE_DENOMINATOR)
+    return 1 / Fraction(1 / fps).limit_denominator(_MAX_RATE_DENOMINATOR)
 
 
 def _even(picture: Picture) -> Picture:
