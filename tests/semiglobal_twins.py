@@ -8,63 +8,76 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap, Mask
-from mvcodec.kernels.semiglobal import PARTS
 
+Bytes = NDArray[np.uint8]
 Costs = NDArray[np.uint8]
-Sums = NDArray[np.float32]
-Census = NDArray[np.uint64]
 
 # (x, y) steps of the eight paths: four lead right or down, four the opposite way.
 FORTH = ((1, 0), (1, 1), (0, 1), (-1, 1))
 BACK = ((-1, 0), (-1, -1), (0, -1), (1, -1))
 
 
-def sampling_interval(picture: NDArray[np.float32], step_x: int, step_y: int) -> NDArray[np.float32]:
-    height, width = picture.shape[1:]
-    padded = np.pad(picture, ((0, 0), (1, 1), (1, 1)), mode="edge")
-    before = padded[:, 1 - step_y : 1 - step_y + height, 1 - step_x : 1 - step_x + width]
-    after = padded[:, 1 + step_y : 1 + step_y + height, 1 + step_x : 1 + step_x + width]
-    samples = np.stack([picture, (picture + before) / 2, (picture + after) / 2])
-    return np.stack([samples.min(axis=0), samples.max(axis=0)])
+def sampling_interval(planes: Bytes, *, along_rows: bool) -> Bytes:
+    """(H, C, W) to (H, 2, C, W)."""
+    height, _, width = planes.shape
+    whole = planes.astype(int)
+    padded = np.pad(whole, ((1, 1), (0, 0), (1, 1)), mode="edge")
+    before = padded[1 : 1 + height, :, :width] if along_rows else padded[:height, :, 1 : 1 + width]
+    after = padded[1 : 1 + height, :, 2:] if along_rows else padded[2:, :, 1 : 1 + width]
+    between = np.stack([2 * whole, whole + before, whole + after]) / 2
+    least, most = np.floor(between.min(axis=0)), np.ceil(between.max(axis=0))
+    return np.stack([least, most], axis=1).astype(np.uint8)
+
+
+def census_rows(grey: Bytes, radius_x: int, radius_y: int) -> Bytes:
+    height, width = grey.shape
+    found = np.zeros((height, -(-((2 * radius_x + 1) * (2 * radius_y + 1) - 1) // 8), width), np.uint8)
+    for y, x in np.ndindex(height, width):
+        place = 0
+        for dy in range(-radius_y, radius_y + 1):
+            for dx in range(-radius_x, radius_x + 1):
+                if (dx, dy) != (0, 0):
+                    there = grey[min(max(y + dy, 0), height - 1), min(max(x + dx, 0), width - 1)]
+                    found[y, place // 8, x] |= int(there < grey[y, x]) << place % 8
+                    place += 1
+    return found
 
 
 def pair_cost(
-    colours: NDArray[np.float32],
-    bits: int,
-    bounds: NDArray[np.float32],
-    other_bits: int,
-    limits: tuple[float, float, float],
+    here: Bytes, bits: Bytes, bounds: Bytes, other_bits: Bytes, limits: tuple[int, int, int]
 ) -> int:
-    """Of a pixel, colours (3,), against a pixel of a partner, bounds (2, 3)."""
-    colour_limit, bit_cost, bit_limit = limits
-    below, above = bounds[0] - colours, colours - bounds[1]
-    colour = float(np.maximum(np.maximum(below, above), 0).sum())
-    structure = (bits ^ other_bits).bit_count() * bit_cost
-    return int(min(colour, colour_limit) + min(structure, bit_limit))
+    """Of a pixel (C,) with its census (B,) against one of a partner, bounds (2, C) and census (B,)."""
+    colour_limit, bit_cost, most_bits = limits
+    least, most = bounds.astype(int)
+    beyond = np.maximum(np.maximum(here - most, least - here.astype(int)), 0)
+    colour = min(int(beyond.sum()), 255) // 2
+    distance = sum(int(a ^ b).bit_count() for a, b in zip(bits, other_bits, strict=True))
+    return min(colour, colour_limit) + min(distance, most_bits) * bit_cost
 
 
 def joint_costs(
-    picture: NDArray[np.float32],
-    census: Census,
-    bounds: NDArray[np.float32],
-    other_census: Census,
+    planes: Bytes,
+    census: Bytes,
+    bounds: Bytes,
+    across: NDArray[np.bool_],
     steps: NDArray[np.float32],
     low: int,
-    limits: tuple[float, float, float],
+    limits: tuple[int, int, int],
     lone_cost: int,
     outside_cost: int,
     levels: int,
 ) -> Costs:
-    height, width = census.shape
+    """Of camera 0 against all others, which are its partners in turn: (H, W, levels)."""
+    height, width = planes.shape[1], planes.shape[3]
     volume = np.empty((height, width, levels), np.uint8)
     for y, x, level in np.ndindex(volume.shape):
         found = []
-        for partner, (by_x, by_y) in enumerate(steps):
+        for partner, (by_x, by_y) in enumerate(steps, 1):
             u, v = x - round(float(by_x) * (low + level)), y - round(float(by_y) * (low + level))
             if 0 <= u < width and 0 <= v < height:
-                there = bounds[partner, :, :, v, u]
-                other_bits = int(other_census[partner, v, u])
-                found.append(pair_cost(picture[:, y, x], int(census[y, x]), there, other_bits, limits))
+                interval = bounds[0 if across[partner - 1] else 1, partner, v, :, :, u]
+                there = census[partner, v, :, u]
+                found.append(pair_cost(planes[0, y, :, x], census[0, y, :, x], interval, there, limits))
         found.sort()
         if not found:
             volume[y, x, level] = outside_cost
@@ -72,20 +85,16 @@ def joint_costs(
             volume[y, x, level] = found[0]
         else:
             pair = [(found[0] + found[1]) // 2] if len(found) > 1 else []
-            volume[y, x, level] = min([found[0] + lone_cost, 254, *pair])
+            volume[y, x, level] = min([found[0] + lone_cost, *pair])
     return volume
 
 
 def path_costs(
-    costs: Costs,
-    grey: FloatMap,
-    step: tuple[int, int],
-    penalties: tuple[float, float, float, float],
-) -> Sums:
-    """Equation 13 of Hirschmueller 2008 along one path; penalties: P1, P2, least P2, contrast."""
-    small, large, least_large, contrast = penalties
+    costs: Costs, grey: Bytes, jumps: Bytes, small: int, step: tuple[int, int]
+) -> NDArray[np.int64]:
+    """Equation 13 of Hirschmueller 2008 along one path of an (H, W, levels) volume."""
     height, width, levels = costs.shape
-    path = np.zeros((height, width, levels))
+    path = np.zeros((height, width, levels), np.int64)
     by_x, by_y = step
     for y in range(height)[:: 1 if by_y >= 0 else -1]:
         for x in range(width)[:: 1 if by_x >= 0 else -1]:
@@ -94,25 +103,19 @@ def path_costs(
             if not (0 <= u < width and 0 <= v < height):
                 continue
             last = path[v, u]
-            difference = abs(float(grey[y, x]) - float(grey[v, u]))
-            jump = np.floor(max(large / (1 + difference / contrast), least_large) * PARTS + 0.5) / PARTS
+            jump = int(jumps[abs(int(grey[y, x]) - int(grey[v, u]))])
             for level in range(levels):
                 ways = [last[level], last.min() + jump]
                 ways += [last[beside] + small for beside in (level - 1, level + 1) if 0 <= beside < levels]
                 path[y, x, level] += min(ways) - last.min()
-    return path.astype(np.float32)
+    return path
 
 
-def aggregate(
-    costs: Costs,
-    grey: FloatMap,
-    steps: Sequence[tuple[int, int]],
-    penalties: tuple[float, float, float, float],
-) -> Sums:
-    total = np.zeros(costs.shape, np.float32)
-    for step in steps:
-        total += path_costs(costs, grey, step, penalties)
-    return total
+def added_up(
+    costs: Costs, grey: Bytes, jumps: Bytes, small: int, steps: Sequence[tuple[int, int]]
+) -> NDArray[np.uint16]:
+    paths = [path_costs(costs, grey, jumps, small, step) for step in steps]
+    return np.asarray(np.sum(paths, axis=0), np.uint16)
 
 
 def winners(sums: NDArray[np.uint16], low: int) -> FloatMap:
@@ -127,6 +130,19 @@ def winners(sums: NDArray[np.uint16], low: int) -> FloatMap:
             # Two lines of equal slope, that of the steeper side, meet here.
             offset = (left - right) / (2 * max(left, right)) if max(left, right) > 0 else 0.0
         disparity[y, x] = low + best + offset
+    return disparity
+
+
+def partner_winners(sums: NDArray[np.uint16], low: int, step: tuple[float, float], unseen: float) -> FloatMap:
+    height, width, levels = sums.shape
+    least = np.full((height, width), 65535)
+    disparity = np.full((height, width), unseen, np.float32)
+    for y in range(height):
+        for level in range(levels):
+            for x in range(width):
+                u, v = x - round(step[0] * (low + level)), y - round(step[1] * (low + level))
+                if 0 <= u < width and 0 <= v < height and sums[y, x, level] < least[v, u]:
+                    least[v, u], disparity[v, u] = sums[y, x, level], low + level
     return disparity
 
 
@@ -160,7 +176,8 @@ def completion_costs(
     low: int,
     slope: float,
     limit: float,
-    through_cost: float,
+    through_cost: int,
+    most: int,
     levels: int,
 ) -> Costs:
     height, width = disparity.shape
@@ -168,12 +185,12 @@ def completion_costs(
     for y, x, level in np.ndindex(volume.shape):
         d = low + level
         if valid[y, x]:
-            volume[y, x, level] = int(min(abs(d - float(disparity[y, x])) * slope, limit))
+            volume[y, x, level] = int(min(abs(d - float(disparity[y, x])) * slope, limit, most))
             continue
         through = 0
         for other, other_valid, step in zip(others, others_valid, steps, strict=True):
-            u, v = seen_at(x, y, step, d)
+            u, v = x - round(float(step[0]) * d), y - round(float(step[1]) * d)
             inside = 0 <= u < width and 0 <= v < height
             through += bool(inside and other_valid[v, u] and other[v, u] < d - 1.5)
-        volume[y, x, level] = int(min(through * through_cost, 254))
+        volume[y, x, level] = min(through * through_cost, most)
     return volume

@@ -12,7 +12,8 @@ from stereo_scene import Planes, linear_or_grid
 from mvcodec.array import Position, Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import FloatMap, Picture
-from mvcodec.stereo.joint import Joint, JointSettings
+from mvcodec.stereo.joint import Joint
+from mvcodec.stereo.joint_settings import JointSettings
 
 
 def pictures_of(scene: PlaneScene) -> dict[Position, Picture]:
@@ -224,22 +225,15 @@ def test_lone_camera_is_flat_at_the_far_end_of_a_negative_range() -> None:
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (
-            lambda: JointSettings(colour_limit=121),
-            r"JointSettings\.colour_limit: found 121, expected 0\.\.120",
-        ),
-        (lambda: JointSettings(bit_limit=-1), r"JointSettings\.bit_limit: found -1, expected 0\.\.130"),
-        (lambda: JointSettings(lone_cost=101), "JointSettings.lone_cost: found 101"),
+        (lambda: JointSettings(colour_limit=61), "colour_limit: found 61, expected a whole number, 0..60"),
+        (lambda: JointSettings(most_bits=-1), "JointSettings.most_bits: found -1"),
+        (lambda: JointSettings(lone_cost=51), "JointSettings.lone_cost: found 51"),
         (lambda: JointSettings(outside_cost=255), "JointSettings.outside_cost: found 255"),
-        (lambda: JointSettings(through_cost=255), "JointSettings.through_cost: found 255"),
-        (lambda: JointSettings(hold_limit=255), "JointSettings.hold_limit: found 255"),
-        (lambda: JointSettings(contrast=0), "JointSettings.contrast: found 0"),
         (lambda: JointSettings(tolerance_px=0), "JointSettings.tolerance_px: found 0"),
         (lambda: JointSettings(subpixel_steps=-1), "JointSettings.subpixel_steps: found -1"),
-        (lambda: JointSettings(small_step=-1), "JointSettings.small_step: found -1"),
-        (lambda: JointSettings(jump=float("nan")), "JointSettings.jump: found nan"),
-        (lambda: JointSettings(completion_jump=float("inf")), "JointSettings.completion_jump: found inf"),
-        (lambda: JointSettings(median_size=4), "JointSettings.median_size: found 4, expected 0, 3 or 5"),
+        (lambda: JointSettings(row_cost=float("nan")), "JointSettings.row_cost: found nan"),
+        (lambda: JointSettings(median_size=4), "JointSettings.median_size: found 4, expected one of 0, 3, 5"),
+        (lambda: JointSettings(bit_cost=60), "the highest cost: found 1296, expected at most 156"),
     ],
 )
 def test_bad_settings_are_named(make: Callable[[], JointSettings], text: str) -> None:
@@ -249,7 +243,9 @@ def test_bad_settings_are_named(make: Callable[[], JointSettings], text: str) ->
 
 def test_settings_at_their_limits_still_make_maps() -> None:
     """Costs stay within their 8 bits where every one of them is the highest."""
-    dearest = JointSettings(120, 1000, 130, 100, 254, through_cost=254, hold_limit=254, median_size=0)
+    dearest = JointSettings(
+        60, bit_cost=3, most_bits=20, lone_cost=32, outside_cost=127, through_cost=127, median_size=0
+    )
     array = linear_or_grid(2, 2, 90, 70)
     scene = Planes(array, 2, 8)
     maps = Joint(dearest).match(array, scene.pictures(), (0.0, 12.0))

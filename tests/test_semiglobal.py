@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 import semiglobal_twins as twins
 from numpy.typing import NDArray
 
-from mvcodec.kernels import completion, semiglobal
+from mvcodec.errors import SettingError
+from mvcodec.kernels import census, completion, matching_costs, semiglobal
+from mvcodec.stereo.scanlines import BAND_ROWS, MAX_SUM, Penalties, Scratch, added_up
 
 SIZES = [(7, 9), (1, 1), (1, 11), (8, 1), (4, 5)]
 STEPS = {
@@ -19,7 +24,7 @@ STEPS = {
     "all four, rho 0.5": [(0, -0.5), (-1, 0), (1, 0), (0, 0.5)],
 }
 LEVELS = 8
-LIMITS = (60.5, 2.75, 90.5)  # colour_limit, bit_cost, bit_limit
+LIMITS = (30, 2, 45)  # colour_limit, bit_cost, most_bits
 
 size_parameter = pytest.mark.parametrize("size", SIZES, ids=str)
 low_parameter = pytest.mark.parametrize("low", [-5, 0, 2])
@@ -28,58 +33,92 @@ steps_parameter = pytest.mark.parametrize(
 )
 
 
-def planes(size: tuple[int, int], seed: int, spread: int = 256) -> NDArray[np.float32]:
-    return np.random.default_rng(seed).integers(0, spread, (3, *size)).astype(np.float32)
+def random_bytes(shape: tuple[int, ...], seed: int, spread: int = 256) -> NDArray[np.uint8]:
+    return np.random.default_rng(seed).integers(0, spread, shape).astype(np.uint8)
+
+
+def levels_second(volume: NDArray[Any]) -> NDArray[Any]:
+    """Twins have (H, W, levels), kernels (H, levels, W)."""
+    return np.ascontiguousarray(volume.transpose(0, 2, 1))
 
 
 def joint_costs(
-    picture: NDArray[np.float32],
-    census: NDArray[np.uint64],
-    bounds: NDArray[np.float32],
-    other_census: NDArray[np.uint64],
+    planes: NDArray[np.uint8],
+    census: NDArray[np.uint8],
+    bounds: NDArray[np.uint8],
+    across: NDArray[np.bool_],
     steps: NDArray[np.float32],
     *,
     low: int,
-    lone_cost: int = 12,
+    lone_cost: int = 6,
     levels: int = LEVELS,
 ) -> NDArray[np.uint8]:
-    volume = np.full((*census.shape, levels), 77, np.uint8)
-    semiglobal.joint_costs(picture, census, bounds, other_census, steps, low, *LIMITS, lone_cost, 100, volume)
-    return volume
+    """Of camera 0 against all others: (H, W, levels)."""
+    volume = np.full((planes.shape[1], levels, planes.shape[3]), 77, np.uint8)
+    matching_costs.joint_costs(
+        0,
+        np.arange(1, len(planes)),
+        planes,
+        census,
+        across,
+        bounds,
+        steps,
+        low,
+        *LIMITS,
+        lone_cost,
+        100,
+        volume,
+    )
+    return volume.transpose(0, 2, 1)
 
 
 def uniform_costs(
-    differences: list[float], bits: list[int], steps: list[tuple[float, float]], lone_cost: int = 12
+    differences: list[int], bits: list[int], steps: list[tuple[float, float]], lone_cost: int = 6
 ) -> NDArray[np.uint8]:
     """Volume (1, 6, 3), low 0, where a partner differs by so much grey a channel and so many census bits."""
-    bounds = np.stack([np.full((2, 3, 1, 6), difference, np.float32) for difference in differences])
-    other_census = np.stack([np.full((1, 6), 2**count - 1, np.uint64) for count in bits])
-    return joint_costs(
-        np.zeros((3, 1, 6), np.float32),
-        np.zeros((1, 6), np.uint64),
-        bounds,
-        other_census,
-        np.array(steps, np.float32),
-        low=0,
-        lone_cost=lone_cost,
-        levels=3,
-    )
+    cameras = 1 + len(steps)
+    bounds = np.full((2, cameras, 1, 2, 3, 6), 100, np.uint8)
+    census = np.zeros((cameras, 1, 8, 6), np.uint8)
+    for camera, (difference, count) in enumerate(zip(differences, bits, strict=True), 1):
+        bounds[:, camera] += np.uint8(difference % 256)
+        census[camera] = np.packbits(np.arange(64) < count)[None, :, None]
+    planes = np.full((cameras, 1, 3, 6), 100, np.uint8)
+    where = np.array(steps, np.float32)
+    across = np.ones(len(steps), np.bool_)
+    return joint_costs(planes, census, bounds, across, where, low=0, lone_cost=lone_cost, levels=3)
 
 
 @size_parameter
-@pytest.mark.parametrize("step", [(1, 0), (0, 1)], ids=["across", "down"])
-def test_sampling_intervals_equal_their_plain_twin(size: tuple[int, int], step: tuple[int, int]) -> None:
-    picture = planes(size, 1)
-    found = semiglobal.sampling_interval(picture, *step)
-    np.testing.assert_array_equal(found, twins.sampling_interval(picture, *step))
+@pytest.mark.parametrize("along_rows", [True, False])
+def test_sampling_intervals_equal_their_plain_twin(size: tuple[int, int], along_rows: bool) -> None:
+    planes = random_bytes((size[0], 3, size[1]), 1)
+    found = np.empty((size[0], 2, 3, size[1]), np.uint8)
+    matching_costs.sampling_interval(planes, along_rows, found)
+    np.testing.assert_array_equal(found, twins.sampling_interval(planes, along_rows=along_rows))
 
 
 def test_sampling_interval_reaches_half_way_to_the_neighbours() -> None:
-    ramp = np.broadcast_to(np.array([0, 10, 40], np.float32), (3, 1, 3)).copy()
-    least, greatest = semiglobal.sampling_interval(ramp, 1, 0)
-    assert least[0, 0].tolist() == [0, 5, 25]
-    assert greatest[0, 0].tolist() == [5, 25, 40]
-    assert (semiglobal.sampling_interval(ramp, 0, 1) == ramp).all()  # across the baseline nothing changes
+    ramp = np.array([[[0, 10, 41]]], np.uint8)
+    found = np.empty((1, 2, 1, 3), np.uint8)
+    matching_costs.sampling_interval(ramp, True, found)
+    assert found[0, :, 0].tolist() == [[0, 5, 25], [5, 26, 41]]
+    matching_costs.sampling_interval(ramp, False, found)  # across the baseline nothing changes
+    assert found[0, :, 0].tolist() == [[0, 10, 41]] * 2
+
+
+@size_parameter
+@pytest.mark.parametrize("radii", [(1, 1), (2, 2), (4, 3)], ids=str)
+def test_census_rows_equal_their_plain_twin(size: tuple[int, int], radii: tuple[int, int]) -> None:
+    grey = random_bytes(size, 2, 20)
+    expected = twins.census_rows(grey, *radii)
+    found = np.full(expected.shape, 77, np.uint8)
+    census.census_rows(grey, *radii, found)
+    np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("value", [0, 1, 0b1011, 255])
+def test_bits_are_counted(value: int) -> None:
+    assert census.count_bits(np.uint8(value)) == value.bit_count()
 
 
 @size_parameter
@@ -88,96 +127,123 @@ def test_sampling_interval_reaches_half_way_to_the_neighbours() -> None:
 def test_joint_costs_equal_their_plain_twin(
     size: tuple[int, int], low: int, steps: NDArray[np.float32]
 ) -> None:
-    rng = np.random.default_rng(2)
-    picture = planes(size, 3, spread=60)
-    bounds = np.stack([twins.sampling_interval(planes(size, 4 + p, 60), 1, 0) for p in range(len(steps))])
-    census, *other_census = rng.integers(0, 2**64, (1 + len(steps), *size), np.uint64)
-    arguments = picture, census, bounds, np.stack(other_census), steps
-    expected = twins.joint_costs(*arguments, low, LIMITS, 12, 100, LEVELS)
-    np.testing.assert_array_equal(joint_costs(*arguments, low=low), expected)
+    cameras = 1 + len(steps)
+    planes = random_bytes((cameras, size[0], 3, size[1]), 3, spread=60)
+    bits = random_bytes((cameras, size[0], 8, size[1]), 4)
+    bounds = np.sort(random_bytes((2, cameras, size[0], 2, 3, size[1]), 5, spread=60), axis=3)
+    across = steps[:, 0] != 0
+    expected = twins.joint_costs(planes, bits, bounds, across, steps, low, LIMITS, 6, 100, LEVELS)
+    np.testing.assert_array_equal(joint_costs(planes, bits, bounds, across, steps, low=low), expected)
 
 
 def test_cost_adds_colour_and_census() -> None:
-    # 3 channels of 5 grey levels, 4 bits of 2.75.
-    assert (uniform_costs([5], [4], [(0, 0)]) == 15 + 11).all()
-    assert (uniform_costs([-5], [4], [(0, 0)]) == 15 + 11).all()
+    # 3 channels of 5 grey levels, in twos; 4 bits of 2.
+    assert (uniform_costs([5], [4], [(0, 0)]) == 7 + 8).all()
+    assert (uniform_costs([-5], [4], [(0, 0)]) == 7 + 8).all()
 
 
 def test_colour_and_census_are_truncated_each() -> None:
-    assert (uniform_costs([200], [0], [(0, 0)]) == 60).all()
+    assert (uniform_costs([100], [0], [(0, 0)]) == 30).all()
     assert (uniform_costs([0], [64], [(0, 0)]) == 90).all()
-    assert (uniform_costs([200], [64], [(0, 0)]) == 151).all()
+    assert (uniform_costs([100], [64], [(0, 0)]) == 120).all()
 
 
 def test_two_best_partners_count_half_each() -> None:
-    costs = uniform_costs([4, 6, 9, 20], [0] * 4, [(0, 0)] * 4)  # 12, 18, 27, 60
-    assert (costs == 15).all()
+    costs = uniform_costs([4, 6, 9, 20], [0] * 4, [(0, 0)] * 4)  # 6, 9, 13, 30
+    assert (costs == 7).all()
 
 
 def test_a_partner_that_cannot_see_the_pixel_is_outvoted_at_lone_cost() -> None:
-    assert (uniform_costs([4, 20], [0, 30], [(0, 0)] * 2) == 12 + 12).all()
-    assert (uniform_costs([20, 4], [30, 0], [(0, 0)] * 2, lone_cost=3) == 12 + 3).all()
+    assert (uniform_costs([4, 20], [0, 30], [(0, 0)] * 2) == 6 + 6).all()
+    assert (uniform_costs([20, 4], [30, 0], [(0, 0)] * 2, lone_cost=3) == 6 + 3).all()
 
 
 def test_only_partner_of_an_array_pays_no_lone_cost_but_the_only_one_in_frame_does() -> None:
     one = uniform_costs([4], [0], [(1, 0)])[0]
-    assert one.T.tolist() == [[12] * 6, [100, *[12] * 5], [100, 100, *[12] * 4]]
+    assert one.T.tolist() == [[6] * 6, [100, *[6] * 5], [100, 100, *[6] * 4]]
     two = uniform_costs([4, 4], [0, 0], [(1, 0), (0, 1)])[0]  # a lower partner of one row: in frame at 0 px
-    assert two.T.tolist() == [[12] * 6, [100, *[24] * 5], [100, 100, *[24] * 4]]
+    assert two.T.tolist() == [[6] * 6, [100, *[12] * 5], [100, 100, *[12] * 4]]
 
 
-@size_parameter
-@pytest.mark.parametrize(("downwards", "steps"), [(True, twins.FORTH), (False, twins.BACK)])
-def test_aggregate_equals_equation_13(
-    size: tuple[int, int], downwards: bool, steps: tuple[tuple[int, int], ...]
-) -> None:
-    rng = np.random.default_rng(5)
-    costs = rng.integers(0, 255, (*size, LEVELS), np.uint8)
-    grey = rng.integers(0, 40, size).astype(np.float32)
-    penalties = 35.0, 170.0, 50.0, 8.0
-    # The first pass overwrites what it finds, the second adds to it.
-    found = np.full(costs.shape, 1000, np.uint16)
-    semiglobal.aggregate(costs, grey, *penalties, found, downwards)
-    expected = semiglobal.PARTS * twins.aggregate(costs, grey, steps, penalties) + (0 if downwards else 1000)
-    np.testing.assert_array_equal(found, expected)
+def sums_of(costs: NDArray[np.uint8], grey: NDArray[np.uint8], penalties: Penalties) -> NDArray[np.uint16]:
+    """(H, W, levels)."""
+    return added_up(levels_second(costs), grey, penalties, Scratch()).transpose(0, 2, 1)
+
+
+PENALTIES = Penalties(small_step=18, jump=85, least_jump=25, contrast=8)
+
+
+@pytest.mark.parametrize("size", [*SIZES, (3, 2 * BAND_ROWS), (BAND_ROWS + 3, 2)], ids=str)
+@pytest.mark.parametrize("diagonal", [True, False])
+def test_sums_equal_equation_13_along_all_paths(size: tuple[int, int], diagonal: bool) -> None:
+    costs = random_bytes((*size, LEVELS), 5, 150)
+    grey = random_bytes(size, 6, 40)
+    penalties = replace(PENALTIES, diagonal=diagonal)
+    paths = [step for step in twins.FORTH + twins.BACK if diagonal or 0 in step]
+    expected = twins.added_up(costs, grey, penalties.jumps(), 18, paths)
+    np.testing.assert_array_equal(sums_of(costs, grey, penalties), expected)
 
 
 @pytest.mark.parametrize("levels", [1, 2, 3])
-@pytest.mark.parametrize(
-    "penalties", [(0.0, 0.0, 0.0, 1.0), (9.0, 9.0, 9.0, 1.0), (2.0, 300.0, 0.0, 0.5)], ids=str
-)
-def test_both_passes_walk_all_eight_paths(levels: int, penalties: tuple[float, float, float, float]) -> None:
-    rng = np.random.default_rng(6)
-    costs = rng.integers(0, 255, (5, 6, levels), np.uint8)
-    grey = rng.uniform(0, 255, (5, 6)).astype(np.float32)
-    found = np.empty(costs.shape, np.uint16)
-    for downwards in (True, False):
-        semiglobal.aggregate(costs, grey, *penalties, found, downwards)
-    expected = semiglobal.PARTS * twins.aggregate(costs, grey, twins.FORTH + twins.BACK, penalties)
-    np.testing.assert_array_equal(found, expected)
+@pytest.mark.parametrize("penalties", [(0, 0, 0, 1.0), (9, 9, 9, 1.0), (2, 180, 0, 0.5)], ids=str)
+def test_few_levels_and_extreme_penalties(levels: int, penalties: tuple[int, int, int, float]) -> None:
+    costs = random_bytes((5, 6, levels), 6, 73)
+    grey = random_bytes((5, 6), 7)
+    given = Penalties(*penalties)
+    expected = twins.added_up(costs, grey, given.jumps(), penalties[0], twins.FORTH + twins.BACK)
+    np.testing.assert_array_equal(sums_of(costs, grey, given), expected)
 
 
-def test_the_dearest_paths_fit_into_the_sums() -> None:
-    costs = np.full((9, 9, 8), semiglobal.MAX_COST, np.uint8)
+def test_the_dearest_paths_fit_into_8_bits() -> None:
+    penalties = Penalties(small_step=100, jump=100, least_jump=100, contrast=1)
+    costs = np.full((9, 9, 8), MAX_SUM - 200, np.uint8)
     costs[::2, :, 0] = costs[1::2, :, -1] = 0  # whichever way a path goes, it jumps or pays
-    most = float(semiglobal.MAX_PENALTY)
-    penalties = most, most, most, 1.0
-    sums = np.empty(costs.shape, np.uint16)
-    for downwards in (True, False):
-        semiglobal.aggregate(costs, np.zeros((9, 9), np.float32), *penalties, sums, downwards)
-    expected = twins.aggregate(costs, np.zeros((9, 9), np.float32), twins.FORTH + twins.BACK, penalties)
-    np.testing.assert_array_equal(sums, semiglobal.PARTS * expected)
+    grey = np.zeros((9, 9), np.uint8)
+    expected = twins.added_up(costs, grey, penalties.jumps(), 100, twins.FORTH + twins.BACK)
+    np.testing.assert_array_equal(sums_of(costs, grey, penalties), expected)
+
+
+def test_jumps_cost_half_at_the_contrast_and_never_less_than_the_least() -> None:
+    jumps = PENALTIES.jumps()
+    assert (jumps[0], jumps[8], jumps[24], jumps[255]) == (85, 43, 25, 25)
+
+
+@pytest.mark.parametrize(
+    ("penalties", "text"),
+    [
+        ((-1, 2, 3, 1.0), "penalties of at least 0"),
+        ((1, 2, 3, 0.0), "contrast above 0"),
+        ((100, 101, 3, 1.0), r"small_step \+ jump: found 201, expected at most 200"),
+        ((100, 1, 101, 1.0), "found 201"),
+    ],
+)
+def test_penalties_that_cannot_be_are_named(penalties: tuple[int, int, int, float], text: str) -> None:
+    with pytest.raises(SettingError, match=text):
+        Penalties(*penalties)
 
 
 def test_what_one_pixel_knows_reaches_all_eight_ways() -> None:
     costs = np.full((7, 7, 3), 50, np.uint8)
     costs[3, 3, 1] = 0
-    sums = np.empty(costs.shape, np.uint16)
-    for downwards in (True, False):
-        semiglobal.aggregate(costs, np.zeros((7, 7), np.float32), 20, 40, 10, 8, sums, downwards)
+    sums = sums_of(costs, np.zeros((7, 7), np.uint8), Penalties(20, 40, 10, 8))
     prefers = sums[..., 1] < sums[..., 0]
     y, x = np.mgrid[-3:4, -3:4]
     assert (prefers == ((x == 0) | (y == 0) | (abs(x) == abs(y)))).all()
+
+
+@size_parameter
+@low_parameter
+@steps_parameter
+@pytest.mark.parametrize("spread", [3, 1000], ids=["many ties", "few ties"])
+def test_what_partners_see_equals_its_plain_twin(
+    size: tuple[int, int], low: int, steps: NDArray[np.float32], spread: int
+) -> None:
+    sums = np.random.default_rng(7).integers(0, spread, (*size, LEVELS)).astype(np.uint16)
+    for by_x, by_y in steps:
+        found = np.full(size, np.nan, np.float32)
+        semiglobal.partner_winners(levels_second(sums), low, by_x, by_y, np.inf, found)
+        expected = twins.partner_winners(sums, low, (float(by_x), float(by_y)), np.inf)
+        np.testing.assert_array_equal(found, expected)
 
 
 @size_parameter
@@ -186,7 +252,7 @@ def test_what_one_pixel_knows_reaches_all_eight_ways() -> None:
 def test_winners_equal_their_plain_twin(size: tuple[int, int], levels: int, spread: int) -> None:
     sums = np.random.default_rng(7).integers(0, spread, (*size, levels)).astype(np.uint16)
     found = np.full(size, np.nan, np.float32)
-    semiglobal.winners(sums, -4, found)
+    semiglobal.winners(levels_second(sums), -4, found)
     np.testing.assert_allclose(found, twins.winners(sums, -4), atol=1e-6)
 
 
@@ -205,7 +271,7 @@ def test_winners_equal_their_plain_twin(size: tuple[int, int], levels: int, spre
 )
 def test_winner_is_placed_between_levels(sums: list[float], expected: float) -> None:
     found = np.empty((1, 1), np.float32)
-    semiglobal.winners(np.array([[sums]], np.uint16), 0, found)
+    semiglobal.winners(np.array([[sums]], np.uint16).transpose(0, 2, 1).copy(), 0, found)
     assert found[0, 0] == expected
 
 
@@ -213,7 +279,7 @@ def test_winner_is_placed_between_levels(sums: list[float], expected: float) -> 
 def test_winner_of_a_v_is_exact(centre: float) -> None:
     sums = np.rint(1000 * np.abs(np.arange(5) - centre))[None, None].astype(np.uint16)
     found = np.empty((1, 1), np.float32)
-    semiglobal.winners(sums, -10, found)
+    semiglobal.winners(levels_second(sums), -10, found)
     assert found[0, 0] == pytest.approx(centre - 10, abs=1e-5)
 
 
@@ -269,24 +335,24 @@ def test_completion_costs_equal_their_plain_twin(
 ) -> None:
     own, *others = near_maps(size, 1 + len(steps), 9)
     valid, *others_valid = np.random.default_rng(10).uniform(size=(1 + len(steps), *size)) < share
-    volume = np.full((*size, LEVELS), 77, np.uint8)
-    arguments = own, valid, np.stack(others), np.stack(others_valid), steps, low, 7.25, 40.5, 90.0
+    volume = np.full((size[0], LEVELS, size[1]), 77, np.uint8)
+    arguments = own, valid, np.stack(others), np.stack(others_valid), steps, low, 7.25, 40.5, 90, 200
     completion.completion_costs(*arguments, volume)
-    np.testing.assert_array_equal(volume, twins.completion_costs(*arguments, LEVELS))
+    np.testing.assert_array_equal(volume.transpose(0, 2, 1), twins.completion_costs(*arguments, LEVELS))
 
 
 def test_without_evidence_every_disparity_is_equally_likely() -> None:
     nothing = np.zeros((4, 5), np.bool_)
-    volume = np.full((4, 5, LEVELS), 77, np.uint8)
+    volume = np.full((4, LEVELS, 5), 77, np.uint8)
     maps = near_maps((4, 5), 2, 11)
     steps = np.array([(1, 0)], np.float32)
-    completion.completion_costs(maps[0], nothing, maps[1:], nothing[None], steps, 0, 7, 40, 40, volume)
+    completion.completion_costs(maps[0], nothing, maps[1:], nothing[None], steps, 0, 7, 40, 40, 200, volume)
     assert (volume == 0).all()
 
 
 def test_completion_rules_out_what_another_camera_sees_through() -> None:
     others = np.full((2, 1, 9), 1.0, np.float32)
-    volume = np.full((1, 9, 5), 77, np.uint8)
+    volume = np.full((1, 5, 9), 77, np.uint8)
     completion.completion_costs(
         np.zeros((1, 9), np.float32),
         np.zeros((1, 9), np.bool_),
@@ -297,8 +363,9 @@ def test_completion_rules_out_what_another_camera_sees_through() -> None:
         7,
         40,
         40,
+        200,
         volume,
     )
     # Whatever stood at 3 px or nearer would hide the background, at 1 px, that both others see there.
-    assert volume[0, 4].tolist() == [0, 0, 0, 80, 80]
-    assert volume[0, 0].tolist() == [0, 0, 0, 40, 40]  # one of them looks past the frame
+    assert volume[0, :, 4].tolist() == [0, 0, 0, 80, 80]
+    assert volume[0, :, 0].tolist() == [0, 0, 0, 40, 40]  # one of them looks past the frame

@@ -194,7 +194,7 @@ def code_anchor(source: ArraySource, qp: int) -> CodedArray:
             source,
             rate=RateControl(qp=qp),
             gop=default_gop(source.array.fps),
-            preset=EncoderConfig().preset,
+            preset=EncoderConfig().chosen_preset,
             on_picture=bar.update,
         )
 

@@ -80,7 +80,7 @@ def measure(arguments: argparse.Namespace) -> dict[str, list[CurvePoint]]:
 def _point(
     source: ArraySource, chosen: range, config: EncoderConfig, spool: MapSpool, folder: Path
 ) -> CurvePoint:
-    matcher = Remembered(find_matcher(config.matcher), spool)
+    matcher = Remembered(find_matcher(config.chosen_matcher), spool)
     synthesizer = make_synthesizer(DEFAULT_SYNTHESIZER)
     return measure_chain(source, chosen, config, matcher, synthesizer, folder / "coded.mcap", lambda: None)
 

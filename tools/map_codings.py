@@ -125,7 +125,7 @@ def prepared(arguments: argparse.Namespace) -> Iterator[Material]:
     range_px = find_range(source, chosen, arguments.disparity_range)
     frame_sets = list(source.frame_sets(slice(chosen.start, chosen.stop), source.array.positions))
     with tempfile.TemporaryDirectory() as folder, MapSpool(Path(folder)) as spool:
-        matcher = Remembered(find_matcher(EncoderConfig().matcher), spool)
+        matcher = Remembered(find_matcher(EncoderConfig().chosen_matcher), spool)
         yield Material(source.array, frame_sets, range_px, matcher)
 
 

@@ -171,7 +171,9 @@ def _encode(material: Material) -> Times:
     }
     for kind, (width, height) in sizes.items():
         rate = rates[kind]
-        settings = VideoSettings(kind, width, height, array.fps, default_gop(array.fps), rate, config.preset)
+        settings = VideoSettings(
+            kind, width, height, array.fps, default_gop(array.fps), rate, config.chosen_preset
+        )
         for camera in array.real:
             if kind is TrackKind.TEXTURE:
                 planes = [to_planes(frame_set.pictures[camera]) for frame_set in material.frame_sets]

@@ -13,6 +13,7 @@ from mvcodec.cli.arguments import disparity_qp, disparity_range, pair_of_sizes
 from mvcodec.cli.paths import local_path
 from mvcodec.encoding.config import AUTO
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.speed import FOR_FILES, FOR_LIVE, SPEEDS
 from mvcodec.frames import FrameSet
 from mvcodec.layers.refinement import matcher_choices
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
@@ -39,6 +40,11 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
     """How pictures and maps are coded, apart from the rate."""
     default = EncoderConfig()
     parser.add_argument(
+        "--speed",
+        choices=SPEEDS,
+        help=f"sets --matcher and --preset together (default: {FOR_FILES}; of standard input: {FOR_LIVE})",
+    )
+    parser.add_argument(
         "--codec",
         choices=CODECS,
         default=default.codec,
@@ -50,15 +56,14 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--matcher",
-        default=default.matcher,
         metavar="NAME",
-        help=f"{matcher_choices()} (default: %(default)s)",
+        help=f"{matcher_choices()} (default: what --speed has; best: {SPEEDS[FOR_FILES].matcher})",
     )
     parser.add_argument(
         "--preset",
-        default=default.preset,
         metavar="NAME",
-        help=f"effort of video encoders, one of {', '.join(PRESETS)} (default: %(default)s)",
+        help=f"effort of video encoders, one of {', '.join(PRESETS)} (default: what --speed has; best:"
+        f" {SPEEDS[FOR_FILES].preset})",
     )
 
 
@@ -113,6 +118,7 @@ def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: 
         disparity_cameras=arguments.disparity_cameras,
         disparity_median=arguments.disparity_median,
         gop=arguments.gop,
+        speed=arguments.speed or FOR_FILES,
         matcher=arguments.matcher,
         preset=arguments.preset,
         codec=arguments.codec,

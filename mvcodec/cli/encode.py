@@ -37,6 +37,7 @@ from mvcodec.cli.time_options import add_time_options, timing_of
 from mvcodec.container import McapWriter, read_info
 from mvcodec.depth import require_calibration
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.speed import FOR_LIVE
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.output.live_view import LiveView
 
@@ -183,6 +184,8 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
 
 def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
     """The settings, checked against the array before the time-consuming part begins."""
+    if arguments.speed is None and str(arguments.input[0]) == STANDARD:
+        arguments.speed = FOR_LIVE
     if arguments.depth:
         require_calibration(array, arguments.nominal)
     rates = {"qp": arguments.qp, "crf": arguments.crf, "bitrate_kbps": arguments.bitrate}

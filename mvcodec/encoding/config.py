@@ -6,6 +6,7 @@ import math
 from dataclasses import InitVar, dataclass, fields
 
 from mvcodec.array import CameraArray
+from mvcodec.encoding.speed import FOR_FILES, SPEEDS
 from mvcodec.errors import SettingError
 from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.matcher import Matcher
@@ -53,8 +54,13 @@ class EncoderConfig:
     gop: int | None = setting(
         None, "frame sets from keyframe to keyframe, at most one second's (default: one second)", low=1
     )
-    matcher: str | Matcher = "joint"
-    preset: str = setting("slow", "effort of the video encoder", choices=PRESETS)
+    speed: str = setting(
+        FOR_FILES, "how much time coding may take: sets matcher and preset together", choices=tuple(SPEEDS)
+    )
+    matcher: str | Matcher | None = None
+    preset: str | None = setting(
+        None, "effort of the video encoder (default: what the speed has)", choices=PRESETS
+    )
     disparity_range_px: tuple[float, float] | None = None
     disparity_qp: int | None = setting(
         None,
@@ -100,6 +106,16 @@ class EncoderConfig:
     def names(cls) -> tuple[str, ...]:
         """What the constructor takes."""
         return "qp", "crf", "bitrate_kbps", *(item.name for item in fields(cls))
+
+    @property
+    def chosen_matcher(self) -> str | Matcher:
+        """The matcher given, or the speed's."""
+        return self.matcher or SPEEDS[self.speed].matcher
+
+    @property
+    def chosen_preset(self) -> str:
+        """The preset given, or the speed's."""
+        return self.preset or SPEEDS[self.speed].preset
 
     @property
     def quality(self) -> float | None:

@@ -15,7 +15,7 @@ from mvcodec.depth import depth_mm
 from mvcodec.encoding.config import EncoderConfig, default_gop, find_matcher, matcher_name
 from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet, Picture
-from mvcodec.stereo.matcher import Matcher
+from mvcodec.stereo.matcher import Matcher, SelectiveMatcher
 from mvcodec.stream import (
     HEADER_TRACK,
     Packet,
@@ -76,7 +76,7 @@ class Encoder:
             raise SettingError(
                 "gop", self._gop, f"1..{longest} (a keyframe each second at {array.fps:g} fps)"
             )
-        self._matcher = matcher or find_matcher(self.config.matcher)
+        self._matcher = matcher or find_matcher(self.config.chosen_matcher)
         self._scale = self.config.scale_for(array)
         self._median = self.config.median_for(array)
         size = even_size(array.width, array.height)
@@ -149,8 +149,14 @@ class Encoder:
         assert self._header is not None
         if not (self._header.map_cameras or self.config.depth):
             return
-        maps = self._matcher.match(self.array, pictures, self._header.disparity_range_px)
-        values = {camera: self._checked_map(maps, camera) for camera in self.array.real}
+        range_px = self._header.disparity_range_px
+        if isinstance(self._matcher, SelectiveMatcher) and not self.config.depth:
+            cameras = self._header.map_cameras
+            maps = self._matcher.match_cameras(self.array, pictures, range_px, cameras, keyframe)
+        else:
+            cameras = self.array.real
+            maps = self._matcher.match(self.array, pictures, range_px)
+        values = {camera: self._checked_map(maps, camera) for camera in cameras}
         self._maps = values
         for camera in self._header.map_cameras:
             track = Track(TrackKind.DISPARITY, camera)
@@ -181,7 +187,7 @@ class Encoder:
             self.array.fps,
             self._gop,
             rate,
-            self.config.preset,
+            self.config.chosen_preset,
             coded_before=self._coded_before,
         )
         return {Track(kind, camera): self._codec.encoder(settings) for camera in cameras}
@@ -211,8 +217,9 @@ class Encoder:
             "disparity_qp": None if maps is None else maps.qp,
             "disparity_median": None if maps is None else self._median,
             "gop": self._gop,
-            "preset": config.preset,
-            "matcher": matcher_name(config.matcher),
+            "speed": config.speed,
+            "preset": config.chosen_preset,
+            "matcher": matcher_name(config.chosen_matcher),
             "video": codec.settings(TrackKind.TEXTURE),
             "disparity": None if maps is None else codec.settings(TrackKind.DISPARITY),
             "encoder": f"mvcodec {mvcodec.__version__}",

@@ -195,14 +195,14 @@ class StudyRun:
                 tour,
                 rate=RateControl(qp=qp),
                 gop=self.gop,
-                preset=self.study.config.preset,
+                preset=self.study.config.chosen_preset,
             )
         )
         return {"codec": curve.codec, "gop": self.gop, **settings}
 
     def _plugins(self) -> dict[str, Any]:
         """Matcher and synthesizer in full, so that a changed default makes another point."""
-        matcher = self.study.config.matcher
+        matcher = self.study.config.chosen_matcher
         assert isinstance(matcher, str)
         synthesizer = SYNTHESIZER_PLUGINS.choose(self.study.synthesizer)
         return {
@@ -264,7 +264,7 @@ class StudyRun:
             self.source,
             self.chosen,
             replace(self.study.config, qp=qp),
-            Remembered(find_matcher(self.study.config.matcher), self._maps),
+            Remembered(find_matcher(self.study.config.chosen_matcher), self._maps),
             make_synthesizer(self.study.synthesizer),
             self.store.folder / f"{name}.mcap",
             partial(self._on_pictures, 1),
@@ -279,7 +279,7 @@ class StudyRun:
             codec=curve.codec,
             rate=RateControl(qp=qp),
             gop=self.gop,
-            preset=self.study.config.preset,
+            preset=self.study.config.chosen_preset,
             threads=1,
             on_picture=self._go_on,
         )

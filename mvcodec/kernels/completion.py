@@ -6,11 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvcodec.kernels.semiglobal import MAX_COST
-
 FloatMap = NDArray[np.float32]
 Mask = NDArray[np.bool_]
-CostVolume = NDArray[np.uint8]
+Volume = NDArray[np.uint8]
 
 
 @njit(cache=True, nogil=True)
@@ -22,7 +20,7 @@ def confirmed(
     Args:
         disparity: float32 (H, W), px.
         others: float32 (P, H, W), maps of other cameras.
-        steps: float32 (P, 2), as in `semiglobal.joint_costs`.
+        steps: float32 (P, 2), as in `matching_costs.joint_costs`.
         tolerance: px.
     """
     height, width = disparity.shape
@@ -45,6 +43,18 @@ def confirmed(
 
 
 @njit(cache=True, nogil=True)
+def _held(disparity, here, per_px, most, costs):  # type: ignore[no-untyped-def]
+    for x in range(disparity.size):
+        costs[x] = np.uint8(min(abs(here - disparity[x]) * per_px, most))
+
+
+@njit(cache=True, nogil=True)
+def _seen_through(other, other_valid, nearest, count):  # type: ignore[no-untyped-def]
+    for x in range(other.size):
+        count[x] += np.uint8(other_valid[x] & (other[x] < nearest))
+
+
+@njit(cache=True, nogil=True)
 def completion_costs(
     disparity: FloatMap,
     valid: Mask,
@@ -54,8 +64,9 @@ def completion_costs(
     low: int,
     slope: float,
     limit: float,
-    through_cost: float,
-    volume: CostVolume,
+    through_cost: int,
+    most: int,
+    volume: Volume,
 ) -> None:
     """Costs that complete a map from its valid pixels.
 
@@ -65,26 +76,29 @@ def completion_costs(
     Args:
         disparity, valid: (H, W), float32 px and bool.
         others, others_valid: (P, H, W), of the other cameras.
-        steps: float32 (P, 2), as in `semiglobal.joint_costs`.
+        steps: float32 (P, 2), as in `matching_costs.joint_costs`.
         low: disparity of level 0, px.
-        volume: uint8 (H, W, levels), written.
+        most: no cost is higher.
+        volume: uint8 (H, levels, W), written.
     """
-    height, width, levels = volume.shape
-    per_px, most, through = np.float32(slope), np.float32(limit), np.float32(through_cost)
+    height, levels, width = volume.shape
+    per_px, held = np.float32(slope), np.float32(min(limit, most))
+    count = np.empty(width, np.uint8)
     for y in range(height):
-        for x in range(width):
-            here = volume[y, x]
-            if valid[y, x]:
-                offset = np.float32(low) - disparity[y, x]
-                for level in range(levels):
-                    here[level] = np.uint8(min(abs(np.float32(level) + offset) * per_px, most))
-                continue
-            for level in range(levels):
-                cost = np.float32(0)
-                for p in range(len(steps)):
-                    u = int(np.rint(x - steps[p, 0] * (low + level)))
-                    v = int(np.rint(y - steps[p, 1] * (low + level)))
-                    inside = 0 <= u < width and 0 <= v < height
-                    if inside and others_valid[p, v, u] and others[p, v, u] < low + level - 1.5:
-                        cost += through
-                here[level] = np.uint8(min(cost, np.float32(MAX_COST)))
+        for level in range(levels):
+            costs = volume[y, level]
+            _held(disparity[y], np.float32(low + level), per_px, held, costs)
+            count[:] = 0
+            for p in range(len(steps)):
+                left = int(np.rint(steps[p, 0] * (low + level)))
+                row = y - int(np.rint(steps[p, 1] * (low + level)))
+                first, last = max(left, 0), min(width + left, width)
+                if 0 <= row < height and first < last:
+                    there = slice(first - left, last - left)
+                    nearest = np.float32(low + level - 1.5)
+                    _seen_through(
+                        others[p, row, there], others_valid[p, row, there], nearest, count[first:last]
+                    )
+            for x in range(width):
+                through = min(int(count[x]) * through_cost, most)
+                costs[x] = costs[x] if valid[y, x] else np.uint8(through)

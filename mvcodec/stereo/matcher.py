@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from typing import Protocol, runtime_checkable
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.frames import DisparityMap, Picture
@@ -26,6 +26,28 @@ class PairMatcher(Protocol):
             the left one is at ``x - d`` in the right one, a pixel x of the right one at
             ``x + d`` in the left one. `valid` is False where the two contradict each other;
             every value is finite all the same (filled).
+        """
+        ...
+
+
+@runtime_checkable
+class SelectiveMatcher(Protocol):
+    """A Matcher that saves time where only some cameras' maps are wanted."""
+
+    def match_cameras(
+        self,
+        array: CameraArray,
+        pictures: Mapping[Position, Picture],
+        range_px: tuple[float, float],
+        cameras: Sequence[Position],
+        fresh: bool,
+    ) -> dict[Position, DisparityMap]:
+        """Disparity of some real cameras; the other arguments are those of `Matcher.match`.
+
+        Args:
+            cameras: the ones wanted.
+            fresh: nothing may depend on earlier frame sets, as it may otherwise. So it is at keyframes, for
+                segments that are coded apart.
         """
         ...
 

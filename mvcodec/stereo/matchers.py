@@ -8,9 +8,11 @@ from mvcodec.errors import SettingError
 from mvcodec.plugins import Plugin, PluginTable
 from mvcodec.stereo.adcensus import AdCensus, AdCensusSettings
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
-from mvcodec.stereo.joint import Joint, JointSettings
+from mvcodec.stereo.joint import Joint
+from mvcodec.stereo.joint_settings import BALANCED, REALTIME, JointSettings
 from mvcodec.stereo.matcher import Matcher, PairMatcher
 from mvcodec.stereo.pairwise import Pairwise
+from mvcodec.stereo.realtime import Realtime
 from mvcodec.stereo.sgbm import Sgbm, SgbmSettings
 
 
@@ -22,6 +24,10 @@ def _fixed_window(measure: str, title: str, window: int = 9) -> Plugin:
 
 MATCHERS: dict[str, Plugin] = {
     "joint": Plugin(Joint, JointSettings, "each camera against all its neighbours at once; the default"),
+    "balanced": Plugin(Joint, JointSettings, "the same with less in it: a few times as fast", BALANCED),
+    "realtime": Plugin(
+        Realtime, JointSettings, "the same of small copies, and only of cameras whose map is sent", REALTIME
+    ),
     "sgbm": Plugin(
         lambda made: Pairwise(Sgbm(made)), SgbmSettings, "semi-global matching of pairs, by OpenCV"
     ),

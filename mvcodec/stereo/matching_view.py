@@ -1,8 +1,8 @@
-"""A picture made ready for matching: planes, census and what lies between its pixels."""
+"""The pictures of an array made ready for matching: planes, census and what lies between pixels."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -10,56 +10,101 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.frames import FloatMap, Picture
+from mvcodec.frames import Picture
+from mvcodec.stereo.partners import partners, steps
 from mvcodec.workers import run_all
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MatchingView:
-    """What matching needs of a picture.
+class MatchingViews:
+    """What matching needs of the pictures of N cameras. Rows of all planes stand side by side in memory.
 
     Attributes:
-        planes: float32 (3, H, W), RGB, grey levels at the brightness of the other cameras.
-        grey: float32 (H, W), the same in luma.
-        census: uint64 (H, W), see `mvcodec.kernels.census`.
-        across, down: float32 (2, 3, H, W), least and greatest value within half a pixel along the baselines
-            (`semiglobal.sampling_interval`); None where the array has no such baseline.
+        cameras: in the order of the arrays.
+        planes: uint8 (N, H, 3, W), RGB at equal brightness.
+        grey: uint8 (N, H, W), the same in luma.
+        census: uint8 (N, H, B, W), see `mvcodec.kernels.census.census_rows`.
+        bounds: uint8 (2, N, H, 2, 3, W), least and greatest value within half a pixel along rows and along
+            columns (`matching_costs.sampling_interval`), of the cameras that are partners so.
     """
 
-    planes: NDArray[np.float32]
-    grey: FloatMap
-    census: NDArray[np.uint64]
-    across: NDArray[np.float32] | None
-    down: NDArray[np.float32] | None
+    cameras: Sequence[Position]
+    planes: NDArray[np.uint8]
+    grey: NDArray[np.uint8]
+    census: NDArray[np.uint8]
+    bounds: NDArray[np.uint8]
+
+    def grey_of(self, camera: Position) -> NDArray[np.uint8]:
+        """uint8 (H, W)."""
+        return np.asarray(self.grey[self.cameras.index(camera)])
 
 
 def prepare_views(
     array: CameraArray,
     pictures: Mapping[Position, Picture],
     gains: Mapping[Position, NDArray[np.float32]],
-) -> dict[Position, MatchingView]:
+    cameras: Sequence[Position],
+    census_radii: tuple[int, int],
+) -> MatchingViews:
     """The real cameras' pictures, side by side.
 
     Args:
         gains: float32 (3,) of each camera, what its R, G and B are multiplied by.
+        cameras: the ones to be matched.
+        census_radii: of the census's window, px along rows and along columns.
     """
-    views = run_all(lambda camera: _prepare(array, pictures[camera], gains[camera]), array.real)
-    return dict(zip(array.real, views, strict=True))
+    from mvcodec.kernels import census, matching_costs
 
-
-def _prepare(array: CameraArray, picture: Picture, gain: NDArray[np.float32]) -> MatchingView:
-    from mvcodec.kernels import census, semiglobal
-
-    planes = np.ascontiguousarray(picture.transpose(2, 0, 1)).astype(np.float32)
-    grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), np.uint8)
-    level = grey.astype(np.float32)
-    if np.any(gain != 1):
-        planes *= gain[:, None, None]
-        level = np.asarray(cv2.cvtColor(planes.transpose(1, 2, 0), cv2.COLOR_RGB2GRAY), np.float32)
-    return MatchingView(
-        planes,
-        level,
-        census.census_transform(grey, 4, 3),
-        semiglobal.sampling_interval(planes, 1, 0) if array.col_step else None,
-        semiglobal.sampling_interval(planes, 0, 1) if array.row_step else None,
+    count, height, width = len(array.real), array.height, array.width
+    radius_x, radius_y = census_radii
+    words = -(-((2 * radius_x + 1) * (2 * radius_y + 1) - 1) // 8)
+    found = MatchingViews(
+        array.real,
+        np.empty((count, height, 3, width), np.uint8),
+        np.empty((count, height, width), np.uint8),
+        np.empty((count, height, words, width), np.uint8),
+        np.empty((2, count, height, 2, 3, width), np.uint8),
     )
+    beside = {(camera[0] == other[0], other) for camera in cameras for other in partners(array, camera)}
+
+    def prepare(number: int) -> None:
+        camera = array.real[number]
+        picture = pictures[camera]
+        if np.any(gains[camera] != 1):
+            picture = np.asarray(np.rint(picture * gains[camera]).clip(0, 255), np.uint8)
+        found.planes[number] = picture.transpose(0, 2, 1)
+        cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY, found.grey[number])
+        census.census_rows(found.grey[number], radius_x, radius_y, found.census[number])
+        for side, along_rows in enumerate((True, False)):
+            if (along_rows, camera) in beside:
+                matching_costs.sampling_interval(found.planes[number], along_rows, found.bounds[side, number])
+
+    run_all(prepare, range(count))
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraPartners:
+    """A camera among the others of `MatchingViews`, in the form of `matching_costs.joint_costs`.
+
+    Attributes:
+        camera, partners: their numbers; int64 (P,).
+        across: bool (P,), whether a partner stands in the camera's row.
+        steps: float32 (P, 2), see `partners.steps`.
+    """
+
+    camera: int
+    partners: NDArray[np.int64]
+    across: NDArray[np.bool_]
+    steps: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, array: CameraArray, camera: Position) -> CameraPartners:
+        """The partners beside, above and below a camera."""
+        beside = partners(array, camera)
+        return cls(
+            array.real.index(camera),
+            np.array([array.real.index(other) for other in beside]),
+            np.array([other[0] == camera[0] for other in beside]),
+            steps(array, camera, beside),
+        )

@@ -1,0 +1,90 @@
+"""The matcher for moving pictures in real time: small copies are matched, and their maps brought back.
+
+Large pictures are matched at half or a quarter of their size; their own edges then say where the surfaces of
+the small map end (`mvcodec.kernels.enlargement`). Only cameras whose map is wanted are matched: what their
+partners see is read off their own costs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from mvcodec.array import CameraArray, Position
+from mvcodec.frames import DisparityMap, Picture
+from mvcodec.stereo.joint import Joint
+from mvcodec.stereo.joint_settings import REALTIME, JointSettings
+from mvcodec.workers import run_all
+
+MOST_PX = (240_000, 900_000)
+"""Pictures of more pixels than the first are matched at half their size, than the second at a quarter."""
+
+AGREEMENT_PX = 3.0
+"""Neighbouring samples of a small map that differ by no more are one surface."""
+COLOUR_STEP = 40.0
+"""The colour difference, summed over R, G and B, that counts as much as one sample of distance."""
+
+
+class Realtime:
+    """The `realtime` matcher, a `SelectiveMatcher`."""
+
+    def __init__(self, settings: JointSettings | None = None, most_px: tuple[int, ...] = MOST_PX) -> None:
+        """Match at half the size where pictures have more than most_px[0] pixels, and so on."""
+        self._joint = Joint(settings or JointSettings(**REALTIME))
+        self._most_px = most_px
+
+    def match(
+        self, array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
+    ) -> dict[Position, DisparityMap]:
+        """See `Matcher.match`. `valid` is where a partner confirms the pixel."""
+        return self.match_cameras(array, pictures, range_px, array.real, fresh=True)
+
+    def match_cameras(
+        self,
+        array: CameraArray,
+        pictures: Mapping[Position, Picture],
+        range_px: tuple[float, float],
+        cameras: Sequence[Position],
+        fresh: bool,
+    ) -> dict[Position, DisparityMap]:
+        """See `SelectiveMatcher.match_cameras`."""
+        halvings = sum(array.width * array.height > most for most in self._most_px)
+        return self._match_halved(array, pictures, range_px, cameras, fresh, halvings)
+
+    def _match_halved(
+        self,
+        array: CameraArray,
+        pictures: Mapping[Position, Picture],
+        range_px: tuple[float, float],
+        cameras: Sequence[Position],
+        fresh: bool,
+        halvings: int,
+    ) -> dict[Position, DisparityMap]:
+        if halvings == 0:
+            return self._joint.maps_of(array, pictures, range_px, cameras, fresh)
+        small = replace(array, width=-(-array.width // 2), height=-(-array.height // 2))
+        shrunk = dict(zip(pictures, run_all(_halved, pictures.values()), strict=True))
+        span = range_px[0] / 2, range_px[1] / 2
+        maps = self._match_halved(small, shrunk, span, cameras, fresh, halvings - 1)
+        doubled = run_all(lambda camera: _doubled(maps[camera], pictures[camera], shrunk[camera]), cameras)
+        return dict(zip(cameras, doubled, strict=True))
+
+
+def _halved(picture: Picture) -> Picture:
+    height, width = picture.shape[:2]
+    even = cv2.copyMakeBorder(picture, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
+    size = even.shape[1] // 2, even.shape[0] // 2
+    return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _doubled(small: DisparityMap, picture: Picture, shrunk: Picture) -> DisparityMap:
+    from mvcodec.kernels.enlargement import enlarge
+
+    height, width = picture.shape[:2]
+    values_px = np.empty((height, width), np.float32)
+    enlarge(small.values_px * 2, picture, shrunk, AGREEMENT_PX, COLOUR_STEP, values_px)
+    valid = small.valid.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
+    return DisparityMap(values_px, valid)

@@ -1,0 +1,61 @@
+"""The real-time matcher: small copies are matched, maps brought back, and only of the cameras asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from stereo_scene import Planes, linear_or_grid
+
+from mvcodec.array import Position
+from mvcodec.frames import DisparityMap, Picture
+from mvcodec.stereo.matcher import SelectiveMatcher
+from mvcodec.stereo.realtime import Realtime
+
+RANGE_PX = (0.0, 24.0)
+
+
+def bad_share(scene: Planes, camera: Position, found: DisparityMap) -> float:
+    return float(np.mean(np.abs(found.values_px - scene.disparity_px(camera)) > 1.5))
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (1, 2), (2, 1)], ids=str)
+@pytest.mark.parametrize("halvings", [0, 1, 2])
+def test_surfaces_are_found_at_every_size(shape: tuple[int, int], halvings: int) -> None:
+    array = linear_or_grid(*shape, 150, 101)
+    scene = Planes(array, 4, 16)
+    maps = Realtime(most_px=(0,) * halvings).match(array, scene.pictures(), RANGE_PX)
+    assert list(maps) == list(array.real)
+    for camera, found in maps.items():
+        assert found.values_px.shape == found.valid.shape == (101, 150)
+        assert found.values_px.dtype == np.float32
+        assert bad_share(scene, camera, found) < (0.06, 0.08, 0.15)[halvings]
+        assert 0.5 < found.valid.mean() < 1
+
+
+def test_a_camera_is_matched_alone_as_among_others() -> None:
+    array = linear_or_grid(2, 2, 120, 80)
+    pictures = Planes(array, 4, 16).pictures()
+    matcher = Realtime()
+    assert isinstance(matcher, SelectiveMatcher)
+    every = matcher.match(array, pictures, RANGE_PX)
+    two: list[Position] = [(0, 0), (1, 1)]
+    some = matcher.match_cameras(array, pictures, RANGE_PX, two, fresh=True)
+    assert list(some) == two
+    for camera in two:
+        np.testing.assert_array_equal(some[camera].values_px, every[camera].values_px)
+        np.testing.assert_array_equal(some[camera].valid, every[camera].valid)
+
+
+def test_what_no_partner_sees_is_not_valid() -> None:
+    array = linear_or_grid(1, 2, 100, 60)
+    found = Realtime().match(array, Planes(array, 10, 10).pictures(), (4.0, 16.0))[0, 0]
+    assert found.valid[:, :9].mean() < 0.1  # left of the right camera's picture
+    assert found.valid[:, 12:].mean() > 0.95
+
+
+def test_lone_camera_is_flat() -> None:
+    array = linear_or_grid(1, 1, 20, 10)
+    picture: Picture = np.zeros((10, 20, 3), np.uint8)
+    (found,) = Realtime(most_px=(0,)).match(array, {(0, 0): picture}, (-3.0, 9.0)).values()
+    assert (found.values_px == -3).all()
+    assert not found.valid.any()
