@@ -51,9 +51,9 @@ def test_a_specified_synthesizer_renders_what_the_object_does() -> None:
 
 
 def test_matchers_take_settings_before_and_behind_a_refinement() -> None:
-    plain = mvcodec.make_matcher("joint:subpixel_steps=0,jump=1e+2")
+    plain = mvcodec.make_matcher("joint:subpixel_steps=0,contrast=1e+1")
     assert isinstance(plain, Joint)
-    assert (plain.settings.subpixel_steps, plain.settings.jump) == (0, 100.0)
+    assert (plain.settings.subpixel_steps, plain.settings.contrast) == (0, 10.0)
     refined = mvcodec.make_matcher("ncc:window=5+dlr:erosion_px=3")
     assert isinstance(refined, Refined)
     assert isinstance(refined.matcher, Pairwise)
@@ -115,7 +115,7 @@ def test_a_wrong_matcher_says_what_is_wrong_with_it(specification: str, message:
     ("given", "shortest"),
     [
         ("joint", "joint"),
-        ("joint:subpixel_steps=3,jump=170", "joint"),
+        ("joint:subpixel_steps=3,jump=82", "joint"),
         ("sad:subpixel=on,window=09+dlr:jump_px=1.5", "sad:window=9+dlr"),
         ("sad:subpixel=off", "sad:subpixel=no"),
     ],
