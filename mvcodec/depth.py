@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray
-from mvcodec.errors import SettingError
+from mvcodec.errors import MvCodecWarning, SettingError
 from mvcodec.frames import DecodedSet, FloatMap
 
 MAX_MM = 65535
+
+MOST_BEHIND = 0.5
+"""Where more of the pixels have no depth, that is told."""
 
 
 def require_calibration(array: CameraArray, nominal: bool) -> None:
@@ -46,6 +51,23 @@ def depth_mm(array: CameraArray, values_px: FloatMap) -> NDArray[np.uint16]:
     """`depth_m` in whole millimetres: uint16 (H, W); 0 where it is more than 65.535 m."""
     millimetres = np.rint(depth_m(array, values_px) * 1000)
     return np.where(millimetres <= MAX_MM, millimetres, 0).astype(np.uint16)
+
+
+def warn_behind_infinity(array: CameraArray, maps_px: Iterable[FloatMap], name: str) -> None:
+    """Warn where most of what an array sees has no depth, as when left and right are swapped.
+
+    Args:
+        maps_px: disparity maps of one moment, float32 (H, W), px for the baseline of one cell.
+        name: what to call the array.
+    """
+    shares = [float(np.mean(~np.isfinite(depth_m(array, values)))) for values in maps_px]
+    share = float(np.mean(shares)) if shares else 0.0
+    if share > MOST_BEHIND:
+        text = (
+            f"{name}: {share:.0%} of the pixels lie behind infinity and have no depth: are the cameras swapped"
+            " (rows from top to bottom, columns from left to right), or is `d_inf_px_per_step` wrong?"
+        )
+        warnings.warn(text, MvCodecWarning, stacklevel=3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,8 +20,9 @@ from mvcodec.array import Calibration, CameraArray
 from mvcodec.conformance.validation import validate
 from mvcodec.container import McapWriter
 from mvcodec.decoding.decoder import Decoder
-from mvcodec.depth import depth_m, depth_mm, points_of
+from mvcodec.depth import depth_m, depth_mm, points_of, warn_behind_infinity
 from mvcodec.encoding.encoder import Encoder
+from mvcodec.errors import MvCodecWarning
 from mvcodec.frames import DecodedSet, DisparityMap
 
 GIVEN = Calibration(100.0, 100.0, 47.5, 31.5, 0.05)
@@ -39,6 +41,16 @@ def test_depth_is_focal_length_times_baseline_over_disparity() -> None:
     np.testing.assert_allclose(depth_m(column, values_px)[0, 0], 4.0)
     far = np.array([[0.05]], np.float32)
     assert depth_mm(ARRAY, far).tolist() == [[0]], "100 m don't fit 16 bits of millimetres"
+
+
+def test_cameras_in_the_wrong_order_are_told() -> None:
+    """Left and right swapped, everything lies behind infinity."""
+    right_order = np.full((4, 6), 5, np.float32)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_behind_infinity(ARRAY, [right_order, right_order], "a")
+    with pytest.warns(MvCodecWarning, match=r"a: 100% of the pixels lie behind infinity .* cameras swapped"):
+        warn_behind_infinity(ARRAY, [-right_order, -right_order], "a")
 
 
 def _wall() -> DecodedSet:

@@ -46,7 +46,6 @@ class MessageClock:
         self._name, self._clock = name, clock
         self._topics: dict[str, _Topic] = {}
         self._shifts: list[int] = []
-        self._told_apart = clock == "log"
 
     def time_of(self, message: RecordedPicture) -> int | None:
         """When a picture was taken, ns; None where that is not after the one before."""
@@ -75,9 +74,12 @@ class MessageClock:
         known = [int(median(topic.steps)) for topic in self._topics.values() if topic.steps]
         return round(1e9 / max(known), 3) if known else None
 
-    def check_apart(self, topics: Sequence[str]) -> str | None:
-        """What is wrong where the stamps of topics differ by more than frames do, for the same log times."""
-        step = self.step_ns()
+    def check_apart(self, topics: Sequence[str], step: int | None) -> str | None:
+        """What is wrong where the stamps of topics differ by more than frames do, for the same log times.
+
+        Args:
+            step: usual time from picture to picture, ns.
+        """
         if self._clock == "log" or step is None or any(topic not in self._topics for topic in topics):
             return None
         ahead = {topic: self._topics[topic].ahead_ns for topic in topics}

@@ -147,7 +147,7 @@ class Recording:
             if self._settings.fps is not None or self._reader.indexed or len(first) == 2:
                 break
         if not first:
-            apart = self._clock.check_apart(list(self._topics))
+            apart = self._clock.check_apart(list(self._topics), self._step_ns())
             raise InputError(
                 self.name, f"no frame set of all cameras{f': {apart}' * bool(apart)}", "one at least"
             )
@@ -266,7 +266,7 @@ class Recording:
     def _check_apart(self) -> None:
         if not self._checked_apart and self._step_ns() is not None:
             self._checked_apart = True
-            if (apart := self._clock.check_apart(list(self._topics))) is not None:
+            if (apart := self._clock.check_apart(list(self._topics), self._step_ns())) is not None:
                 self._warn(apart)
 
     def _decode(self, picture: WaitingPicture) -> Picture | None:

@@ -20,7 +20,7 @@ from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.container.point_writer import PointWriter
 from mvcodec.decoding.decoder import Decoder
-from mvcodec.depth import points_of, require_calibration
+from mvcodec.depth import points_of, require_calibration, warn_behind_infinity
 from mvcodec.errors import SettingError
 from mvcodec.output.ply import write_ply
 
@@ -76,7 +76,10 @@ def run(arguments: argparse.Namespace) -> None:
         if arguments.calibration is not None:
             array = replace(array, calibration=read_calibration(arguments.calibration))
         require_calibration(array, arguments.nominal)
-        for decoded in decoder:
+        for number, decoded in enumerate(decoder):
+            if number == 0:
+                maps = (item.values_px for item in decoded.disparities.values())
+                warn_behind_infinity(array, maps, arguments.input)
             points = points_of(replace(decoded, array=array), arguments.stride, arguments.max_depth)
             if suffix == ".ply":
                 write_ply(target, points)

@@ -11,7 +11,7 @@ import numpy as np
 
 import mvcodec
 from mvcodec.array import CameraArray, Position
-from mvcodec.depth import depth_mm
+from mvcodec.depth import depth_mm, warn_behind_infinity
 from mvcodec.encoding.config import EncoderConfig, default_gop, find_matcher, matcher_name
 from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet, Picture
@@ -128,6 +128,9 @@ class Encoder:
             head = Packet(HEADER_TRACK, frames.index, frames.time_ns, True, self._header.to_json())
             packets.insert(0, head)
         if self.config.depth:
+            if self._last is None:
+                maps = (found.values_px for found in self._maps.values())
+                warn_behind_infinity(self.array, maps, self.array.name or "the array")
             packets += [
                 _depth_packet(self.array, camera, frames, self._maps[camera]) for camera in self._maps
             ]
