@@ -64,8 +64,8 @@ def warn_behind_infinity(array: CameraArray, maps_px: Iterable[FloatMap], name: 
     share = float(np.mean(shares)) if shares else 0.0
     if share > MOST_BEHIND:
         text = (
-            f"{name}: {share:.0%} of the pixels lie behind infinity and have no depth: are the cameras swapped"
-            " (rows from top to bottom, columns from left to right), or is `d_inf_px_per_step` wrong?"
+            f"{name}: {share:.0%} of the pixels lie behind infinity and have no depth: are the cameras"
+            " swapped (rows from top to bottom, columns from left to right), or is `d_inf_px_per_step` wrong?"
         )
         warnings.warn(text, MvCodecWarning, stacklevel=3)
 
