@@ -30,6 +30,8 @@ class TrackKind(StrEnum):
     HEADER = "header"
     TEXTURE = "video"
     DISPARITY = "disparity"
+    PREDICTED = "predicted"
+    """A camera's pictures, each coded from its own past and a prediction made from other cameras."""
     DEPTH = "depth"
     """Metric depth for other people's tools; decoders have no use for it."""
 
@@ -51,6 +53,15 @@ class Track:
 
 MAX_SEQUENCE = (1 << 32) - 1
 """MCAP's sequence has 32 bits."""
+
+PREDICTIONS = ("none", "synthesis")
+"""How real cameras are coded: each for itself, or from each other."""
+
+PREDICTOR = "warp-1"
+"""The one way of predicting pictures that there is; another one gets another name."""
+
+REFERENCE_CODEC = "vp9"
+"""The one codec of predicted pictures that there is."""
 
 _CALIBRATION = ("fx_px", "fy_px", "cx_px", "cy_px", "baseline_m", "d_inf_px_per_step")
 
@@ -75,6 +86,18 @@ class Packet:
 
 
 @dataclass(frozen=True, slots=True)
+class PredictedCamera:
+    """A real camera whose pictures are predicted from others.
+
+    Attributes:
+        references: those others; each is real, and plays alone or is predicted before this one.
+    """
+
+    camera: Position
+    references: tuple[Position, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class StreamHeader:
     """Everything that a receiver must know; sent as a packet with each keyframe.
 
@@ -86,6 +109,7 @@ class StreamHeader:
         settings: the encoder's settings, for the record (names and plain JSON values).
         disparity_scale: 1 or 2: the maps are coded at the pictures' size, or at half of it each way.
         disparity_cameras: one of DISPARITY_CAMERAS.
+        predicted: the real cameras that are predicted from others, in the order of decoding.
     """
 
     array: CameraArray
@@ -95,6 +119,7 @@ class StreamHeader:
     settings: Mapping[str, Any] = field(default_factory=dict)
     disparity_scale: int = 1
     disparity_cameras: str = "all"
+    predicted: tuple[PredictedCamera, ...] = ()
 
     def __post_init__(self) -> None:
         low, high = self.disparity_range_px
@@ -105,18 +130,58 @@ class StreamHeader:
             raise SettingError("disparity_scale", self.disparity_scale, expected)
         if self.disparity_cameras not in DISPARITY_CAMERAS:
             raise SettingError("disparity_cameras", self.disparity_cameras, " or ".join(DISPARITY_CAMERAS))
+        self._check_predicted()
+
+    def _check_predicted(self) -> None:
+        """Each prediction needs pictures that are there before it, and maps."""
+        decoded = set(self.array.real) - {each.camera for each in self.predicted}
+        if self.predicted and not self.map_cameras:
+            raise SettingError("prediction.cameras", "some", "none where no camera sends a map")
+        for each in self.predicted:
+            if each.camera not in self.array.real or each.camera in decoded:
+                raise SettingError("prediction.cameras", list(each.camera), "real cameras, each once")
+            if not each.references or not decoded.issuperset(each.references):
+                found = f"{list(each.camera)} from {[list(other) for other in each.references]}"
+                raise SettingError("prediction.cameras", found, "real cameras that are decoded before")
+            decoded.add(each.camera)
 
     @property
     def version(self) -> int:
         """The lowest format version that can say this."""
-        return 2 if self.disparity_cameras == "none" else 1
+        return 2 if self.disparity_cameras == "none" or self.predicted else 1
 
     @property
     def tracks(self) -> tuple[Track, ...]:
         """The video tracks: pictures of every real camera, then the maps."""
-        pictures = (Track(TrackKind.TEXTURE, camera) for camera in self.array.real)
+        pictures = (self.picture_track(camera) for camera in self.array.real)
         maps = (Track(TrackKind.DISPARITY, camera) for camera in self.map_cameras)
         return (*pictures, *maps)
+
+    def picture_track(self, camera: Position) -> Track:
+        """The track of a real camera's pictures."""
+        predicted = any(each.camera == camera for each in self.predicted)
+        return Track(TrackKind.PREDICTED if predicted else TrackKind.TEXTURE, camera)
+
+    def maps_around(self, place: Position) -> tuple[Position, ...]:
+        """Whose maps say what is at a place: its own, if it sends one, else those within a cell."""
+        senders = self.map_cameras
+        if place in senders:
+            return (place,)
+        down, across = self.array.row_step, self.array.col_step
+        return tuple(
+            (row, col)
+            for row, col in senders
+            if abs(row - place[0]) <= down and abs(col - place[1]) <= across
+        )
+
+    def needed_tracks(self, predicted: PredictedCamera) -> set[Track]:
+        """What must be decoded before a camera can be predicted."""
+        pictures = {self.picture_track(camera) for camera in predicted.references}
+        places = (predicted.camera, *predicted.references)
+        maps = {camera for place in places for camera in self.maps_around(place)}
+        # Half-size maps are enlarged along the edges of their cameras' pictures, if these play alone.
+        alone = {track for track in map(self.picture_track, maps) if track.kind is TrackKind.TEXTURE}
+        return pictures | alone | {Track(TrackKind.DISPARITY, camera) for camera in maps}
 
     @property
     def map_cameras(self) -> tuple[Position, ...]:
@@ -137,6 +202,9 @@ class StreamHeader:
             "first_frame": self.first_frame,
             "settings": dict(self.settings),
         }
+        if self.predicted:
+            cameras = [{"camera": each.camera, "from": each.references} for each in self.predicted]
+            document["prediction"] = {"predictor": PREDICTOR, "codec": REFERENCE_CODEC, "cameras": cameras}
         return json.dumps(document, separators=(",", ":")).encode()
 
     @classmethod
@@ -161,7 +229,8 @@ class StreamHeader:
         except SettingError as error:
             raise StreamError(source, f"a damaged header ({error})", "the fields of FORMAT.md") from None
         if header.version > version:
-            found = f"disparity_cameras {header.disparity_cameras} in a header of version {version}"
+            what = "predicted cameras" if header.predicted else "disparity_cameras none"
+            found = f"{what} in a header of version {version}"
             raise StreamError(source, found, f"version {header.version}")
         return header
 
@@ -175,7 +244,31 @@ class StreamHeader:
             settings=fields.inner("settings").values,
             disparity_scale=fields.integer("disparity_scale", 1, DISPARITY_SCALES[-1], 1),
             disparity_cameras=fields.text("disparity_cameras", "all"),
+            predicted=_predicted(fields.inner("prediction")) if "prediction" in fields else (),
         )
+
+
+def _predicted(fields: Fields) -> tuple[PredictedCamera, ...]:
+    """The header's `prediction`."""
+    for name, known in (("predictor", PREDICTOR), ("codec", REFERENCE_CODEC)):
+        if fields.text(name) != known:
+            raise fields.wrong(name, fields.text(name), known)
+    cameras = fields.get("cameras", "a list")
+    try:
+        return tuple(
+            PredictedCamera(_position(each["camera"]), tuple(_position(other) for other in each["from"]))
+            for each in cameras
+        )
+    except (TypeError, KeyError, ValueError):
+        expected = '[{"camera": [row, col], "from": [[row, col], ...]}, ...]'
+        raise fields.wrong("cameras", cameras, expected) from None
+
+
+def _position(value: Any) -> Position:
+    row, col = value
+    if type(row) is not int or type(col) is not int:
+        raise TypeError
+    return row, col
 
 
 def _array(fields: Fields) -> CameraArray:

@@ -18,9 +18,10 @@ from plane_scene import Plane, PlaneScene
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.kernels import prediction_colour, prediction_depth
 from mvcodec.synthesis import prediction
-from mvcodec.synthesis.prediction import PredictionSource, checksum, predict, predicted_disparity
+from mvcodec.synthesis.prediction import PredictionSource, predict, predicted_disparity
 from mvcodec.video.codec import Planes
 from mvcodec.video.colour import to_planes
+from mvcodec.video.vp9_reference import checksum
 from mvcodec.workers import threads
 
 SEEDS, SIZES = st.integers(0, 2**32 - 1), st.tuples(st.integers(1, 12), st.integers(1, 14))

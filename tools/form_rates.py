@@ -3,8 +3,9 @@
     python tools/form_rates.py INPUT [--forms NAME,..] [--qp N,N..] [--matcher NAME] [--real ...]
                                [--frames A:B] [--json]
 
-Forms: `plain` (what encode writes by default), `none` (no maps in the file). All views of the input's grid
-are rendered and compared, the container counts. The last lines are BD-rates against the first form.
+Forms: `plain` (what encode writes by default), `none` (no maps in the file), `synthesis` (real cameras coded
+from each other). All views of the input's grid are rendered and compared, the container counts. The last
+lines are BD-rates against the first form.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from mvcodec.synthesis.synthesizers import make_synthesizer
 FORMS: Mapping[str, Mapping[str, str]] = {
     "plain": {},
     "none": {"disparity_cameras": "none"},
+    "synthesis": {"prediction": "synthesis"},
 }
 QPS = "22,27,32,37,42"
 

@@ -29,6 +29,7 @@ OPTIONS = {
     "gop": "--gop",
     "matcher": "--matcher",
     "preset": "--preset",
+    "prediction": "--prediction",
     "codec": "--codec",
     "threads": "--threads",
     "anchors": "--anchors",

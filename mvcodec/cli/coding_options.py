@@ -17,7 +17,7 @@ from mvcodec.encoding.speed import FOR_FILES, FOR_LIVE, SPEEDS
 from mvcodec.frames import FrameSet
 from mvcodec.layers.refinement import matcher_choices
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
-from mvcodec.stream import DISPARITY_CAMERAS
+from mvcodec.stream import DISPARITY_CAMERAS, PREDICTIONS
 from mvcodec.video.codec import PRESETS
 from mvcodec.video.codecs import CODECS
 
@@ -89,6 +89,13 @@ def _add_disparity(parser: argparse.ArgumentParser) -> None:
         " (default: all or alternate, chosen for the pictures' QP)",
     )
     parser.add_argument(
+        "--prediction",
+        choices=PREDICTIONS,
+        default=EncoderConfig().prediction,
+        help="synthesis: real cameras are coded from each other, for fewer bits; the first one alone plays in"
+        " any viewer, and readers of format version 1 refuse the file (default: %(default)s)",
+    )
+    parser.add_argument(
         "--disparity-median",
         type=int,
         metavar="N",
@@ -117,6 +124,7 @@ def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: 
         disparity_scale=arguments.disparity_scale,
         disparity_cameras=arguments.disparity_cameras,
         disparity_median=arguments.disparity_median,
+        prediction=arguments.prediction,
         gop=arguments.gop,
         speed=arguments.speed or FOR_FILES,
         matcher=arguments.matcher,

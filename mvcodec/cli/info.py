@@ -11,7 +11,7 @@ from typing import Any
 from mvcodec.container import StreamInfo, read_info
 from mvcodec.decoding.estimated_maps import DEFAULT_MATCHER
 from mvcodec.errors import MvCodecWarning, StreamError
-from mvcodec.stream import StreamHeader
+from mvcodec.stream import StreamHeader, TrackKind
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,6 +32,11 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"  grid         {array.rows} x {array.cols}, {array.width} x {array.height} px, {array.fps:g} fps")
     print(f"  real         {len(array.real)} cameras: rows {rows}, cols {cols}")
     print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras, {_maps(info.header)}")
+    if info.header.predicted:
+        tracks = [info.header.picture_track(camera) for camera in array.real]
+        alone = [track.topic for track in tracks if track.kind is TrackKind.TEXTURE]
+        others = count(len(info.header.predicted), "camera")
+        print(f"  prediction   {others} coded from others; {', '.join(alone)} plays alone")
     print(f"  calibration  {'given' if array.calibration.given else 'nominal (the input stated none)'}")
     if info.dropped is not None:
         print(f"  dropped      {count(info.dropped, 'frame set')}, left out while encoding live")
@@ -68,6 +73,10 @@ def document(info: StreamInfo) -> dict[str, Any]:
         "disparity_range_px": list(info.header.disparity_range_px),
         "disparity_scale": info.header.disparity_scale,
         "disparity_cameras": info.header.disparity_cameras,
+        "predicted": [
+            {"camera": list(each.camera), "from": [list(other) for other in each.references]}
+            for each in info.header.predicted
+        ],
         "version": info.header.version,
         "calibration": "given" if array.calibration.given else "nominal",
     }

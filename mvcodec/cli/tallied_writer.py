@@ -33,7 +33,8 @@ class TalliedWriter(McapWriter):
         """What was written, once the writer is closed and something was."""
         assert self._header is not None
         total = 8 * self._output.written
-        texture, disparity = 8 * self._bytes[TrackKind.TEXTURE], 8 * self._bytes[TrackKind.DISPARITY]
+        texture = 8 * (self._bytes[TrackKind.TEXTURE] + self._bytes[TrackKind.PREDICTED])
+        disparity = 8 * self._bytes[TrackKind.DISPARITY]
         return StreamInfo(
             self._header, self.frame_count, Bits(total, texture, disparity, total - texture - disparity)
         )

@@ -19,10 +19,10 @@ from mvcodec.conformance.finding import Finding, error, warning
 from mvcodec.container import schemas
 from mvcodec.errors import StreamError
 from mvcodec.stream import HEADER_TRACK, StreamHeader, Track, TrackKind
-from mvcodec.video.codecs import foxglove_name
 
 _KINDS: dict[str, Any] = {
     "video": CompressedVideo,
+    "predicted": CompressedVideo,
     "calibration": CameraCalibration,
     "transform": FrameTransform,
 }
@@ -44,7 +44,7 @@ class MessageCheck:
 
     def __init__(self, header: StreamHeader, add: Callable[[Finding], None]) -> None:
         self._add = add
-        self._format = foxglove_name(header.codec)
+        self._formats: dict[str, str] = {}
         self._rig = schemas.rig_messages(header.array)
         # Early files have the same principal point in all calibrations, whatever the disparity of infinity.
         same = replace(header.array.calibration, d_inf_px_per_step=0.0)
@@ -53,7 +53,8 @@ class MessageCheck:
         self._frames: dict[str, str] = {}
         for track in header.tracks:
             assert track.camera is not None
-            self._kinds[track.topic] = "video"
+            self._kinds[track.topic] = schemas.video_kind(track)
+            self._formats[track.topic] = schemas.video_format(track, header.codec)
             self._frames[track.topic] = schemas.frame_id(track.camera)
         self._unseen = {HEADER_TRACK.topic, *self._kinds}
         self._size = header.array.width, header.array.height
@@ -101,7 +102,7 @@ class MessageCheck:
             found = f"{message.schema!r} as {message.encoding!r}"
             self._add(error("schema", f"{found}, expected {name} as protobuf", *where))
             return None
-        if kind == "video":
+        if message.topic in self._formats:
             return self._video(message)
         if kind == "depth":
             self._depth(message)
@@ -137,8 +138,9 @@ class MessageCheck:
         except DecodeError as failure:
             self._add(error("schema", f"a damaged message ({failure})", *where))
             return None
-        if parsed.format != self._format:
-            self._add(error("format", f"format {parsed.format!r}, expected {self._format!r}", *where))
+        expected = self._formats[message.topic]
+        if parsed.format != expected:
+            self._add(error("format", f"format {parsed.format!r}, expected {expected!r}", *where))
         self._check_stamps(parsed, *where)
         data: bytes = parsed.data
         return data

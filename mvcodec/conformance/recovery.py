@@ -17,6 +17,7 @@ from mvcodec.stream import Packet, StreamHeader, Track, TrackKind
 from mvcodec.video.codecs import CODECS
 from mvcodec.video.map_size import track_sizes
 from mvcodec.video.reference_watch import ReferenceWatch
+from mvcodec.video.vp9_reference import unit_codec
 
 Incomplete = Literal["keep", "drop"]
 
@@ -109,7 +110,8 @@ class _Tracks:
         """Why a packet cannot be decoded; None where it can."""
         if packet.keyframe:
             size = self._sizes[packet.track.kind]
-            self._watches[packet.track] = ReferenceWatch(self._codec, size)
+            codec = unit_codec(packet.track, self._codec)
+            self._watches[packet.track] = ReferenceWatch(codec, size)
         watch = self._watches.get(packet.track)
         if watch is None:
             return StreamError(label, "a picture that builds on one that is missing", "a keyframe")
@@ -213,17 +215,30 @@ class _Copier:
             elif track not in self._absent:
                 self._absent.add(track)
                 self._tell(error)
+        self._drop_unpredicted(usable)
         return usable
+
+    def _drop_unpredicted(self, usable: dict[Track, Packet]) -> None:
+        """Leave out predicted pictures whose predictions cannot be made."""
+        for each in self._header.predicted:
+            track = self._header.picture_track(each.camera)
+            if track in usable and not self._header.needed_tracks(each) <= usable.keys():
+                packet = usable.pop(track)
+                self._tracks.lose([track])
+                if track not in self._absent:
+                    self._absent.add(track)
+                    found = "a picture whose references are missing"
+                    self._tell(StreamError(self._label(packet), found, "all of them"))
 
     def _can_be_shown(self, usable: dict[Track, Packet]) -> bool:
         """Whether there is a camera with picture and map, without which nothing is decoded."""
         if not self._header.map_cameras:
             array = self._header.array
-            there = [camera for camera in array.real if Track(TrackKind.TEXTURE, camera) in usable]
+            there = [camera for camera in array.real if self._header.picture_track(camera) in usable]
             return can_be_estimated(array, there)
-        kinds = (TrackKind.TEXTURE, TrackKind.DISPARITY)
         return any(
-            all(Track(kind, camera) in usable for kind in kinds) for camera in self._header.map_cameras
+            self._header.picture_track(camera) in usable and Track(TrackKind.DISPARITY, camera) in usable
+            for camera in self._header.map_cameras
         )
 
     def _tell_absent(self, missing: set[Track], first: Packet) -> None:

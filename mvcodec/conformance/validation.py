@@ -21,6 +21,7 @@ from mvcodec.errors import InputError, StreamError
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, unknown_fields
 from mvcodec.video.codecs import CODECS
 from mvcodec.video.map_size import track_sizes
+from mvcodec.video.vp9_reference import unit_codec
 
 MAX_FINDINGS = 1000
 """A file that is wrong everywhere is not described further than that."""
@@ -198,7 +199,10 @@ class _StreamCheck:
         if codec is None:
             self._add(error("codec", f"unknown codec {header.codec!r}", HEADER_TRACK.topic))
         else:
-            self._rules = {track: UnitRules(codec, track.kind, sizes[track.kind]) for track in header.tracks}
+            self._rules = {
+                track: UnitRules(unit_codec(track, codec), track.kind, sizes[track.kind])
+                for track in header.tracks
+            }
         self._tracks = {track.topic: track for track in header.tracks}
         self._assembler.start(header.tracks)
 

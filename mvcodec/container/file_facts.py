@@ -70,6 +70,7 @@ def read_info(source: str | Path | BinaryIO, on_damage: OnDamage | None = None) 
             frames, last = frames + (number != last), number
         dropped = reader.dropped
         total = 8 * reader.size
-    texture, disparity = sizes[TrackKind.TEXTURE], sizes[TrackKind.DISPARITY]
+    texture = sizes[TrackKind.TEXTURE] + sizes[TrackKind.PREDICTED]
+    disparity = sizes[TrackKind.DISPARITY]
     bits = Bits(total, texture, disparity, total - texture - disparity)
     return StreamInfo(reader.header, frames, bits, dropped, len(damages))

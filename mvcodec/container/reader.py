@@ -247,7 +247,7 @@ class McapReader(Closing):
         elif track.kind is TrackKind.DEPTH:
             data = schemas.depth_data(data, source, self.header.array.width, self.header.array.height)
         else:
-            data = schemas.video_data(data, source, self.header.codec)
+            data = schemas.video_data(data, source, schemas.video_format(track, self.header.codec))
         return Packet(track, message.sequence, message.log_time, keyframe, data)
 
     def _time_of(self, number: int | None) -> int | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ from mcap_protobuf.schema import build_file_descriptor_set
 
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.errors import StreamError
-from mvcodec.stream import Packet, view_name
+from mvcodec.stream import Packet, Track, TrackKind, view_name
 from mvcodec.video.codecs import foxglove_name
 
 RIG_FRAME = "rig"
@@ -49,6 +49,20 @@ HEADER_SCHEMA = json.dumps(
     separators=(",", ":"),
 ).encode()
 
+PREDICTED_FORMAT = "vp9-predicted"
+"""What messages of predicted pictures call their codec: no viewer knows it, and none tries to play them."""
+
+
+def _predicted_schema() -> tuple[str, bytes]:
+    """`mvcodec.PredictedVideo`: the fields of foxglove.CompressedVideo under a name of its own."""
+    files = build_file_descriptor_set(CompressedVideo)
+    for file in files.file:
+        if file.name == CompressedVideo.DESCRIPTOR.file.name:
+            file.name, file.package = "mvcodec/PredictedVideo.proto", "mvcodec"
+            file.message_type[0].name = "PredictedVideo"
+    return "mvcodec.PredictedVideo", files.SerializeToString()
+
+
 PROTOBUF_SCHEMAS: dict[str, tuple[str, bytes]] = {
     kind: (message.DESCRIPTOR.full_name, build_file_descriptor_set(message).SerializeToString())
     for kind, message in (
@@ -56,7 +70,7 @@ PROTOBUF_SCHEMAS: dict[str, tuple[str, bytes]] = {
         ("calibration", CameraCalibration),
         ("transform", FrameTransform),
     )
-}
+} | {"predicted": _predicted_schema()}
 """Kind of message -> (schema name, serialised FileDescriptorSet)."""
 
 
@@ -110,11 +124,9 @@ def place_messages(
     )
 
 
-def channels(
-    rig: Sequence[RigMessage], video_topics: Sequence[str]
-) -> list[tuple[str, str, str, str, bytes]]:
-    """What `ChunkedFile.add_channel` takes, for each topic of a rig and its videos, once."""
-    kinds = {message.topic: message.kind for message in rig} | dict.fromkeys(video_topics, "video")
+def channels(rig: Sequence[RigMessage], videos: Mapping[str, str]) -> list[tuple[str, str, str, str, bytes]]:
+    """What `ChunkedFile.add_channel` takes, for each topic of a rig and its videos (topic -> kind), once."""
+    kinds = {message.topic: message.kind for message in rig} | dict(videos)
     return [
         (topic, MessageEncoding.Protobuf, name, SchemaEncoding.Protobuf, schema)
         for topic, kind in kinds.items()
@@ -122,15 +134,26 @@ def channels(
     ]
 
 
+def video_kind(track: Track) -> str:
+    """The kind of a video track's messages, a key of PROTOBUF_SCHEMAS."""
+    return "predicted" if track.kind is TrackKind.PREDICTED else "video"
+
+
+def video_format(track: Track, codec: str) -> str:
+    """What the messages of a video track call their codec; `codec` is the header's."""
+    return PREDICTED_FORMAT if track.kind is TrackKind.PREDICTED else foxglove_name(codec)
+
+
 def video_message(packet: Packet, codec: str) -> bytes:
-    """A serialised foxglove.CompressedVideo of a packet."""
+    """A serialised foxglove.CompressedVideo (or mvcodec.PredictedVideo) of a packet."""
     assert packet.track.camera is not None
-    return compressed_video(frame_id(packet.track.camera), packet.time_ns, packet.data, codec)
+    form = video_format(packet.track, codec)
+    return compressed_video(frame_id(packet.track.camera), packet.time_ns, packet.data, form)
 
 
-def compressed_video(frame: str, time_ns: int, data: bytes, codec: str) -> bytes:
+def compressed_video(frame: str, time_ns: int, data: bytes, form: str) -> bytes:
     """A serialised foxglove.CompressedVideo."""
-    message = CompressedVideo(frame_id=frame, data=data, format=foxglove_name(codec))
+    message = CompressedVideo(frame_id=frame, data=data, format=form)
     message.timestamp.FromNanoseconds(time_ns)
     serialised: bytes = message.SerializeToString()
     return serialised
@@ -175,8 +198,11 @@ def _layout(found: tuple[str, int, int, int, int]) -> str:
     return f"{width}x{height} px of {encoding or 'no encoding'}, {step} bytes a row, {size} bytes"
 
 
-def video_data(message: bytes, source: str, codec: str) -> bytes:
-    """The access unit inside a serialised foxglove.CompressedVideo.
+def video_data(message: bytes, source: str, expected: str) -> bytes:
+    """The access unit inside a serialised foxglove.CompressedVideo (or mvcodec.PredictedVideo).
+
+    Args:
+        expected: its format, as `video_format` has it.
 
     Raises:
         StreamError: it is not one, or of another codec than the header says.
@@ -185,7 +211,6 @@ def video_data(message: bytes, source: str, codec: str) -> bytes:
         parsed = CompressedVideo.FromString(message)
     except DecodeError as error:
         raise StreamError(source, f"a damaged message ({error})", "foxglove.CompressedVideo") from None
-    expected = foxglove_name(codec)
     if parsed.format != expected:
         raise StreamError(source, f"video of format {parsed.format!r}", f"{expected!r}, as the header says")
     data: bytes = parsed.data

@@ -10,6 +10,7 @@ from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.closing import Closing
 from mvcodec.container import schemas
 from mvcodec.container.chunked_file import CHUNK_MS, ChunkedFile
+from mvcodec.video.codecs import foxglove_name
 
 
 class VideoTopicsWriter(Closing):
@@ -35,7 +36,7 @@ class VideoTopicsWriter(Closing):
         chunk_ms: int = CHUNK_MS,
     ) -> None:
         self._file = ChunkedFile(target, chunk_ms)
-        self._codec = codec
+        self._format = foxglove_name(codec)
         self._topics = [(f"/view/{name}/video", _frame(name)) for name in views]
         self._rig = [
             message
@@ -54,7 +55,7 @@ class VideoTopicsWriter(Closing):
             for message in self._rig:
                 file.add(message.topic, index, time_ns, message.at(time_ns))
         for (topic, frame), data in zip(self._topics, units, strict=True):
-            file.add(topic, index, time_ns, schemas.compressed_video(frame, time_ns, data, self._codec))
+            file.add(topic, index, time_ns, schemas.compressed_video(frame, time_ns, data, self._format))
         file.end_set()
 
     def close(self) -> None:
@@ -65,7 +66,8 @@ class VideoTopicsWriter(Closing):
 
     def _start(self) -> None:
         self._file.open()
-        for channel in schemas.channels(self._rig, [topic for topic, _ in self._topics]):
+        videos = dict.fromkeys((topic for topic, _ in self._topics), "video")
+        for channel in schemas.channels(self._rig, videos):
             self._file.add_channel(*channel)
 
 

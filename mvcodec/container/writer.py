@@ -101,7 +101,8 @@ class McapWriter(Closing):
         self._video_topics = tuple(track.topic for track in header.tracks)
         json_schema = (schemas.HEADER_SCHEMA_NAME, SchemaEncoding.JSONSchema, schemas.HEADER_SCHEMA)
         self._file.add_channel(HEADER_TRACK.topic, MessageEncoding.JSON, *json_schema)
-        for channel in schemas.channels(self._rig, self._video_topics):
+        kinds = {track.topic: schemas.video_kind(track) for track in header.tracks}
+        for channel in schemas.channels(self._rig, kinds):
             self._file.add_channel(*channel)
 
     def _topics(self) -> str:

@@ -26,13 +26,14 @@ from mvcodec.decoding.stand_in import fill_absent
 from mvcodec.errors import MissingReference, MvCodecWarning, SettingError, StreamClosed, StreamError
 from mvcodec.frames import DecodedSet, DisparityMap, Picture
 from mvcodec.stereo.matcher import Matcher
-from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, view_name
+from mvcodec.stream import Packet, PredictedCamera, StreamHeader, Track, TrackKind, view_name
+from mvcodec.synthesis.frame_prediction import FramePrediction
 from mvcodec.video.codec import Planes
 from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import to_picture
 from mvcodec.video.disparity_code import dequantise
 from mvcodec.video.map_size import enlarged, small_size, track_sizes
-from mvcodec.video.track import TrackDecoder
+from mvcodec.video.track import PredictedTrackDecoder, TrackDecoder
 from mvcodec.workers import Job, check_threads, run_all, settle, submit
 
 OnError = Literal["skip", "stop"]
@@ -73,6 +74,7 @@ class Decoder(Closing):
         self._matcher: Matcher | None = None
         self._header: StreamHeader | None = None
         self._decoders: dict[Track, TrackDecoder] = {}
+        self._predicted: dict[Track, PredictedTrackDecoder] = {}
         self._absent: frozenset[Position] = frozenset()
         self._skipping = False
         check_threads(threads)
@@ -177,7 +179,8 @@ class Decoder(Closing):
             raise StreamClosed("the decoder was flushed; it takes no more packets")
         if packet.track.kind is TrackKind.HEADER:
             return self._push_header(packet)
-        if packet.track not in self._decoders or self._skipping:
+        known = packet.track in self._decoders or packet.track in self._predicted
+        if not known or self._skipping:
             return []
         try:
             sets = self._assembler.push(packet)
@@ -220,7 +223,12 @@ class Decoder(Closing):
         sizes = track_sizes(header.array.width, header.array.height, header.disparity_scale)
         self._matcher = None if header.map_cameras else decoding_matcher(header, self._asked_matcher)
         self._header = header
-        self._decoders = {track: TrackDecoder(codec, sizes[track.kind]) for track in header.tracks}
+        self._decoders, self._predicted = {}, {}
+        for track in header.tracks:
+            if track.kind is TrackKind.PREDICTED:
+                self._predicted[track] = PredictedTrackDecoder(sizes[track.kind])
+            else:
+                self._decoders[track] = TrackDecoder(codec, sizes[track.kind])
         self._assembler.start(header.tracks)
         self._absent, self._skipping = frozenset(), False
 
@@ -251,7 +259,7 @@ class Decoder(Closing):
         senders = [camera for camera in self.header.map_cameras if camera not in reasons]
         if not (senders or (self._matcher and can_be_estimated(array, there))):
             return []
-        textures = [planes[Track(TrackKind.TEXTURE, camera)] for camera in there]
+        textures = [planes[self.header.picture_track(camera)] for camera in there]
         pictures = dict(zip(there, run_all(self._picture, textures), strict=True))
         disparities: Mapping[Position, DisparityMap]
         if self._matcher is None:
@@ -292,12 +300,13 @@ class Decoder(Closing):
                 packet.index,
             )
             for track, packet in packets.packets.items()
+            if track in self._decoders
         }
         settle(jobs.values())
         planes: dict[Track, Planes] = {}
         reasons: dict[Position, StreamError] = {}
         for track in packets.missing:
-            self._decoders[track].lost = True
+            (self._decoders.get(track) or self._predicted[track]).lost = True
             label = self._assembler.label(replace(packets.first, track=track))
             _note(reasons, track, StreamError(label, "no packet", "one for each track of a frame set"))
         for track, job in jobs.items():
@@ -305,7 +314,30 @@ class Decoder(Closing):
                 planes[track] = job.result()
             except MissingReference as error:
                 _note(reasons, track, error)
+        if self._predicted:
+            self._predict(packets, planes, reasons)
         return planes, reasons
+
+    def _predict(
+        self, packets: PacketSet, planes: dict[Track, Planes], reasons: dict[Position, StreamError]
+    ) -> None:
+        """Decode the cameras that are predicted from others, one after the other."""
+        header = self.header
+        frame = FramePrediction(header, planes)
+        for each in header.predicted:
+            track = header.picture_track(each.camera)
+            packet = packets.packets.get(track)
+            if packet is None:
+                continue
+            whole = header.needed_tracks(each) <= planes.keys()
+            make = partial(_predictions, frame, each) if whole else None
+            try:
+                found = self._predicted[track].push(packet, self._assembler.label(packet), make)
+            except MissingReference as error:
+                _note(reasons, track, error)
+            else:
+                planes[track] = found
+                frame.add(each.camera, found)
 
     def _tell_absent(self, reasons: dict[Position, StreamError], first: Packet) -> None:
         for camera in sorted(reasons.keys() - self._absent):
@@ -324,6 +356,10 @@ class Decoder(Closing):
         width, height = small_size(header.array.width, header.array.height, header.disparity_scale)
         found = dequantise(planes.y[:height, :width], header.disparity_range_px)
         return found if header.disparity_scale == 1 else enlarged(found.values_px, picture)
+
+
+def _predictions(frame: FramePrediction, predicted: PredictedCamera) -> list[Planes]:
+    return [frame.predict(predicted.camera, predicted.references)]
 
 
 def _note(reasons: dict[Position, StreamError], track: Track, error: StreamError) -> None:

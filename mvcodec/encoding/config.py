@@ -10,7 +10,7 @@ from mvcodec.encoding.speed import FOR_FILES, SPEEDS
 from mvcodec.errors import SettingError
 from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.matcher import Matcher
-from mvcodec.stream import DISPARITY_CAMERAS, DISPARITY_SCALES, map_cameras
+from mvcodec.stream import DISPARITY_CAMERAS, DISPARITY_SCALES, PREDICTIONS, map_cameras
 from mvcodec.video.codec import PRESETS, RateControl, check_qp
 from mvcodec.video.codecs import find_codec
 from mvcodec.video.disparity_rate import (
@@ -78,6 +78,11 @@ class EncoderConfig:
         " alternate, chosen for the pictures' quantiser)",
         choices=(*DISPARITY_CAMERAS, AUTO),
     )
+    prediction: str = setting(
+        "none",
+        "synthesis: real cameras are coded from each other, for fewer bits; the first one plays alone",
+        choices=PREDICTIONS,
+    )
     disparity_median: int | None = setting(
         None,
         "smooth maps over N x N before coding, N odd; 0: don't (default: 5, at half size 3)",
@@ -98,6 +103,10 @@ class EncoderConfig:
         check_qp("disparity_qp", self.disparity_qp, max_qp)
         self.rate.check_scale(max_qp)
         check_settings(self)
+        if self.prediction != "none" and self.disparity_cameras == "none":
+            raise SettingError("disparity_cameras", "none", f"maps, which prediction {self.prediction} needs")
+        if self.prediction != "none" and self.rate.bitrate_kbps is not None:
+            raise SettingError("prediction", f"{self.prediction} with a bit rate", "qp or crf beside it")
         span = self.disparity_range_px
         if span is not None and not (math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]):
             raise SettingError("disparity_range_px", list(span), "lo < hi")
@@ -135,9 +144,12 @@ class EncoderConfig:
 
     def cameras_for(self, array: CameraArray) -> str:
         """Which real cameras of an array send a map, as `StreamHeader.disparity_cameras`."""
-        if self.disparity_cameras == AUTO:
+        if self.disparity_cameras == AUTO and self.prediction == "none":
             return best_disparity_cameras(self.quality, self.codec, array)
-        return self.disparity_cameras or default_disparity_cameras(self.quality, self.codec, array)
+        given = self.disparity_cameras
+        if given is not None and given != AUTO:
+            return given
+        return default_disparity_cameras(self.quality, self.codec, array)
 
     def rate_of_pictures(self, array: CameraArray) -> RateControl:
         """The rate control of one camera's pictures."""

@@ -13,6 +13,7 @@ import mvcodec
 from mvcodec.array import CameraArray, Position
 from mvcodec.depth import depth_mm, warn_behind_infinity
 from mvcodec.encoding.config import EncoderConfig, default_gop, find_matcher, matcher_name
+from mvcodec.encoding.predicted_cameras import PredictedCameras, predicted_quantizer, prediction_order
 from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stereo.matcher import Matcher, SelectiveMatcher
@@ -81,7 +82,11 @@ class Encoder:
         self._median = self.config.median_for(array)
         size = even_size(array.width, array.height)
         rate = self.config.rate_of_pictures(array)
-        self._encoders = self._make_encoders(TrackKind.TEXTURE, array.real, size, rate)
+        several = self.config.prediction == "synthesis" and len(array.real) > 1
+        self._order = prediction_order(array) if several else ()
+        alone = tuple(camera for camera in array.real if camera not in {each.camera for each in self._order})
+        self._encoders = self._make_encoders(TrackKind.TEXTURE, alone, size, rate)
+        self._predicted: PredictedCameras | None = None
         self._header: StreamHeader | None = None
         self._position = 0  # frame sets since the last keyframe, modulo the GOP
         self._key_ns = 0
@@ -110,6 +115,7 @@ class Encoder:
         if self._header is None:
             self._header = self._make_header(frames)
             self._encoders |= self._make_map_encoders(self._header)
+            self._predicted = self._make_predicted(self._header)
         # Should something fail below, the next frame set starts afresh with a keyframe.
         position, self._position = self._position, 0
         if self._last is not None and frames.time_ns - self._key_ns >= KEYFRAME_NS:
@@ -122,7 +128,12 @@ class Encoder:
                 self._submit(frames, position == 0, jobs)
         finally:
             settle(jobs.values())
-        packets = [_packet(track, frames, job.result()) for track, job in jobs.items()]
+        coded = {track: job.result()[0] for track, job in jobs.items()}
+        if self._predicted is not None:
+            with threads(self.config.threads):
+                pictures = {each.camera: to_planes(frames.pictures[each.camera]) for each in self._order}
+                coded |= self._predicted.push(coded, pictures, position == 0)
+        packets = [_packet(track, frames, coded[track]) for track in self._header.tracks]
         if position == 0:
             self._key_ns = frames.time_ns
             head = Packet(HEADER_TRACK, frames.index, frames.time_ns, True, self._header.to_json())
@@ -146,10 +157,11 @@ class Encoder:
     ) -> None:
         """Start coding all tracks; the pictures are coded while the matcher runs."""
         pictures = {camera: frames.pictures[camera] for camera in self.array.real}
-        for camera, picture in pictures.items():
-            track = Track(TrackKind.TEXTURE, camera)
-            jobs[track] = submit(self._code_picture, track, picture, keyframe)
         assert self._header is not None
+        for camera, picture in pictures.items():
+            track = self._header.picture_track(camera)
+            if track in self._encoders:
+                jobs[track] = submit(self._code_picture, track, picture, keyframe)
         if not (self._header.map_cameras or self.config.depth):
             return
         range_px = self._header.disparity_range_px
@@ -202,6 +214,13 @@ class Encoder:
         rate = self.config.rate_of_maps(self.array, header.disparity_range_px)
         return self._make_encoders(TrackKind.DISPARITY, header.map_cameras, size, rate)
 
+    def _make_predicted(self, header: StreamHeader) -> PredictedCameras | None:
+        if not header.predicted:
+            return None
+        assert self.config.quality is not None
+        quantizer = predicted_quantizer(self.config.quality, self._codec)
+        return PredictedCameras(header, self._codec, quantizer, self.config.preset)
+
     def _make_header(self, frames: FrameSet) -> StreamHeader:
         span = self.config.disparity_range_px
         if span is None:
@@ -211,7 +230,9 @@ class Encoder:
         codec, cameras = self.config.codec, self.config.cameras_for(self.array)
         maps = None if cameras == "none" else self.config.rate_of_maps(self.array, span)
         settings = self._settings_record(maps)
-        return StreamHeader(self.array, span, codec, frames.index, settings, self._scale, cameras)
+        return StreamHeader(
+            self.array, span, codec, frames.index, settings, self._scale, cameras, self._order
+        )
 
     def _settings_record(self, maps: RateControl | None) -> dict[str, Any]:
         config, codec = self.config, self._codec
@@ -219,6 +240,7 @@ class Encoder:
             **asdict(config.rate),
             "disparity_qp": None if maps is None else maps.qp,
             "disparity_median": None if maps is None else self._median,
+            "prediction": config.prediction if self._order else None,
             "gop": self._gop,
             "speed": config.speed,
             "preset": config.chosen_preset,
@@ -278,6 +300,5 @@ def _depth_packet(array: CameraArray, camera: Position, frames: FrameSet, dispar
     return Packet(Track(TrackKind.DEPTH, camera), frames.index, frames.time_ns, True, data)
 
 
-def _packet(track: Track, frames: FrameSet, coded: list[CodedPicture]) -> Packet:
-    (picture,) = coded
+def _packet(track: Track, frames: FrameSet, picture: CodedPicture) -> Packet:
     return Packet(track, frames.index, frames.time_ns, picture.keyframe, picture.data)

@@ -6,7 +6,6 @@ All is whole numbers. `Layered` renders better pictures to look at; it may chang
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -129,15 +128,6 @@ def predict(
     chroma_planes = np.stack([source.chroma for source in ordered])
     run_in_bands(height // 2, predict_chroma, chroma_planes, maps, shifts, weights, LINEAR, disparity, chroma)
     return Planes(y, chroma[0], chroma[1])
-
-
-def checksum(planes: Sequence[Planes]) -> int:
-    """CRC-32 of predictions: rows of Y, Cb and Cr, one picture after the other."""
-    value = 0
-    for picture in planes:
-        for plane in (picture.y, picture.u, picture.v):
-            value = zlib.crc32(np.ascontiguousarray(plane).data, value)
-    return value
 
 
 def _shift(array: CameraArray, camera: Position, place: Position) -> tuple[int, int]:

@@ -41,6 +41,7 @@ def track_sizes(width: int, height: int, scale: int) -> dict[TrackKind, tuple[in
     """Kind of a video track -> width and height of its pictures as coded."""
     return {
         TrackKind.TEXTURE: even_size(width, height),
+        TrackKind.PREDICTED: even_size(width, height),
         TrackKind.DISPARITY: coded_size(width, height, scale),
     }
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from mvcodec.errors import MissingReference, StreamError
+from mvcodec.stream import Packet
 from mvcodec.video.codec import Codec, Planes
 from mvcodec.video.reference_watch import ReferenceWatch
+from mvcodec.video.vp9_reference import PREDICTED, Vp9ReferenceDecoder
 
 
 class TrackDecoder:
@@ -56,3 +60,47 @@ class TrackDecoder:
         if (width, height) != self._size:
             raise StreamError(label, f"a picture of {width}x{height}", f"{self._size[0]}x{self._size[1]}")
         return found[0]
+
+
+class PredictedTrackDecoder:
+    """Decodes one track of pictures that are predicted from outside.
+
+    Args:
+        size: (width, height) of its pictures as coded.
+
+    Attributes:
+        lost: as `TrackDecoder`'s.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self._size = size
+        self._decoder = Vp9ReferenceDecoder(size)
+        self._watch = ReferenceWatch(PREDICTED, size)
+        self.lost = False
+
+    def push(self, packet: Packet, label: str, predictions: Callable[[], list[Planes]] | None) -> Planes:
+        """Decode a unit.
+
+        Args:
+            label: what to call it in an error.
+            predictions: makes its predictions; None where what they need is missing.
+
+        Raises:
+            MissingReference: a picture that it builds on is not there, or not the encoder's.
+            StreamError: it is damaged, or of another size.
+        """
+        if packet.keyframe and self.lost:
+            self._decoder, self._watch = (
+                Vp9ReferenceDecoder(self._size),
+                ReferenceWatch(PREDICTED, self._size),
+            )
+        self.lost = self.lost and not packet.keyframe
+        if self.lost or predictions is None:
+            self.lost = True
+            raise MissingReference(label, "a picture that builds on one that is missing", "a keyframe")
+        try:
+            self._watch.push(packet.data, label, packet.index)
+            return self._decoder.push(packet.data, predictions(), packet.keyframe, label)
+        except StreamError:
+            self.lost = True
+            raise

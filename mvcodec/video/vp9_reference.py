@@ -9,16 +9,20 @@ frames that give the references rooms of their own, in front of the keyframe's o
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
-from mvcodec.errors import SettingError, StreamError
+from mvcodec.errors import MissingReference, SettingError, StreamError
+from mvcodec.stream import Track, TrackKind
 from mvcodec.video import libvpx
+from mvcodec.video.access_unit import UnitFacts
 from mvcodec.video.bits import NalError
-from mvcodec.video.codec import Planes
+from mvcodec.video.codec import Codec, Planes
+from mvcodec.video.vp9 import VP9
 from mvcodec.video.vp9_syntax import parse_frame
 
 MOST_REFERENCES = 2
@@ -26,6 +30,7 @@ MAX_QUANTIZER = 63
 SPEEDS = (0, 8)
 _GREY = 128
 _START_QUANTIZER = 63
+_HEAD = struct.Struct("<IB")
 _SIZE = struct.Struct("<H")
 _PLACES = (libvpx.GOLDEN, libvpx.ALTREF)
 _NOT = (libvpx.NO_GOLDEN, libvpx.NO_ALTREF)
@@ -81,6 +86,7 @@ class ReferenceDecoder(Protocol):
             label: what to call the unit in an error.
 
         Raises:
+            MissingReference: its last picture or its predictions are not those of the encoder.
             StreamError: it is damaged, or not of the form that the encoder writes.
         """
         ...
@@ -103,7 +109,7 @@ class Vp9ReferenceEncoder:
             self._encoder.set_reference(place, _joined(prediction))
         flags = _KEEP | sum(_NOT[len(predictions) :]) | (libvpx.NO_LAST if start else 0)
         frame = self._encoder.encode(_joined(planes), flags)
-        return _packed(start, frame)
+        return ReferenceUnit(checksum(predictions), tuple(start), frame).to_bytes()
 
     def _started(self) -> tuple[libvpx.Vp9Encoder, list[bytes]]:
         """A new encoder, and the frames that give its references rooms of their own."""
@@ -130,25 +136,34 @@ class Vp9ReferenceDecoder:
 
     def push(self, data: bytes, predictions: Sequence[Planes], keyframe: bool, label: str) -> Planes:
         """See `ReferenceDecoder`."""
-        start, frame = _unpacked(data, label)
-        if bool(start) != keyframe:
-            found = f"{len(start)} frames in front of {'a' if keyframe else 'no'} keyframe"
-            raise StreamError(label, found, "some in front of a keyframe, and of nothing else")
         try:
-            if start:
-                self._decoder = libvpx.Vp9Decoder(*self._size)
-                for number, grey in enumerate(start):
-                    _check(grey, self._size if number == 0 else None)
-                    self._decoder.decode(grey)
-            if self._decoder is None:
-                raise StreamError(label, "a picture that builds on one that is missing", "a keyframe")
-            _check(frame, None)
-            for place, prediction in zip(_PLACES, predictions, strict=False):
-                self._decoder.set_reference(place, _joined(prediction))
-            return Planes(*self._decoder.decode(frame))
+            unit = ReferenceUnit.parse(data)
+            if bool(unit.start) != keyframe:
+                raise NalError(f"{len(unit.start)} frames in front of {'a' if keyframe else 'no'} keyframe")
+            if not keyframe and self._decoder is None:
+                raise MissingReference(label, "a picture that builds on one that is missing", "a keyframe")
+            if unit.checksum != checksum(predictions):
+                found = "a prediction that is not the encoder's"
+                raise MissingReference(label, found, f"checksum {unit.checksum:08x}")
+            return self._decode(unit, predictions)
         except (libvpx.LibvpxError, NalError) as error:
-            self._decoder = None
             raise StreamError(label, f"a damaged picture ({error})", "a VP9 frame") from None
+
+    def _decode(self, unit: ReferenceUnit, predictions: Sequence[Planes]) -> Planes:
+        # Should something fail below, only a keyframe can follow.
+        decoder, self._decoder = self._decoder, None
+        if unit.start:
+            decoder = libvpx.Vp9Decoder(*self._size)
+            for number, grey in enumerate(unit.start):
+                _check(grey, self._size if number == 0 else None)
+                decoder.decode(grey)
+        assert decoder is not None
+        _check(unit.frame, None)
+        for place, prediction in zip(_PLACES, predictions, strict=False):
+            decoder.set_reference(place, _joined(prediction))
+        found = Planes(*decoder.decode(unit.frame))
+        self._decoder = decoder
+        return found
 
 
 def _check(data: bytes, size: tuple[int, int] | None) -> None:
@@ -173,23 +188,88 @@ def _joined(planes: Planes) -> libvpx.Bytes:
     return np.concatenate([plane.ravel() for plane in (planes.y, planes.u, planes.v)])
 
 
-def _packed(start: Sequence[bytes], frame: bytes) -> bytes:
-    """One unit: how many frames are in front, each with its size, then the frame."""
-    return bytes([len(start)]) + b"".join(_SIZE.pack(len(each)) + each for each in start) + frame
+def checksum(predictions: Sequence[Planes]) -> int:
+    """CRC-32 of predictions: rows of Y, Cb and Cr, one picture after the other."""
+    value = 0
+    for planes in predictions:
+        for plane in (planes.y, planes.u, planes.v):
+            value = zlib.crc32(np.ascontiguousarray(plane).data, value)
+    return value
 
 
-def _unpacked(data: bytes, label: str) -> tuple[list[bytes], bytes]:
-    start: list[bytes] = []
-    at = 1
-    count = data[0] if data else 0
-    if data and count <= MOST_REFERENCES:
+@dataclass(frozen=True, slots=True)
+class ReferenceUnit:
+    """One message of a predicted track.
+
+    Attributes:
+        checksum: CRC-32 of its predictions.
+        start: the grey frames in front of a keyframe; nothing else has any.
+        frame: the picture's own.
+    """
+
+    checksum: int
+    start: tuple[bytes, ...]
+    frame: bytes
+
+    def to_bytes(self) -> bytes:
+        """As FORMAT.md has it."""
+        start = b"".join(_SIZE.pack(len(each)) + each for each in self.start)
+        return _HEAD.pack(self.checksum, len(self.start)) + start + self.frame
+
+    @classmethod
+    def parse(cls, data: bytes) -> ReferenceUnit:
+        """Parse what `to_bytes` wrote.
+
+        Raises:
+            NalError: it is not that.
+        """
+        if len(data) < _HEAD.size:
+            raise NalError("it ends too early")
+        value, count = _HEAD.unpack_from(data)
+        if count > MOST_REFERENCES:
+            raise NalError(f"{count} frames in front of its own")
+        start, at = [], _HEAD.size
         for _ in range(count):
-            if at + _SIZE.size > len(data):
-                break
-            (size,) = _SIZE.unpack_from(data, at)
+            size = int.from_bytes(data[at : at + _SIZE.size], "little")
             at += _SIZE.size
             start.append(data[at : at + size])
             at += size
-    if not data or count > MOST_REFERENCES or len(start) != count or at >= len(data):
-        raise StreamError(label, "a unit whose parts are not as long as it says", "frames with their sizes")
-    return start, data[at:]
+        if at >= len(data) or not all(start):
+            raise NalError("it ends too early")
+        return cls(value, tuple(start), data[at:])
+
+
+class ReferenceUnits:
+    """Reads the messages of a predicted track, for who does not decode them; see `UnitReader`."""
+
+    def __init__(self) -> None:
+        self._started = False
+
+    def push(self, data: bytes) -> UnitFacts:
+        """See `UnitReader`."""
+        unit = ReferenceUnit.parse(data)
+        found = [parse_frame(piece) for piece in (*unit.start, unit.frame)]
+        self._started |= bool(unit.start)
+        return UnitFacts(
+            keyframe=bool(unit.start),
+            pictures=1,
+            parameters=bool(unit.start),
+            sizes=tuple(frame.size for frame in found if frame.size is not None),
+            sequences=tuple(frame.sequence for frame in found if frame.sequence is not None),
+            broken=() if all(frame.shown for frame in found) else (("hidden", "a frame that is not shown"),),
+            missing=None if self._started else "a picture before the first keyframe",
+        )
+
+
+PREDICTED = replace(
+    VP9,
+    title="VP9 with predictions from outside",
+    units=ReferenceUnits,
+    words=replace(VP9.words, unit="a unit of predicted VP9", parameters="the frames in front of it"),
+)
+"""What validating and recovering must know of predicted tracks; it is none of the table of codecs."""
+
+
+def unit_codec(track: Track, codec: Codec) -> Codec:
+    """What reads the units of a track; `codec` is the header's."""
+    return PREDICTED if track.kind is TrackKind.PREDICTED else codec

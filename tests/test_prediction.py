@@ -1,0 +1,242 @@
+"""Real cameras coded from each other: pictures, random access, missing cameras, damage, and the commands."""
+
+from __future__ import annotations
+
+import io
+import json
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from coding import RANGE_PX, RampMatcher, encode, encoded_file, frame_set, luma_psnr, make_array, pushed
+from command_line import fails, succeeds
+from mcap.reader import make_reader
+from small_arrays import write_array
+
+from mvcodec.array import CameraArray, Position
+from mvcodec.conformance.recovery import recover
+from mvcodec.conformance.validation import validate
+from mvcodec.container import read_info
+from mvcodec.decoding.decoder import Decoder
+from mvcodec.encoding.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.predicted_cameras import prediction_order
+from mvcodec.errors import MvCodecWarning, SettingError, StreamError
+from mvcodec.frames import DecodedSet
+from mvcodec.stream import Packet, PredictedCamera, StreamHeader, Track, TrackKind
+
+FORM = {"prediction": "synthesis"}
+
+
+def predicted_file(array: CameraArray | None = None, frames: int = 3, **changes: object) -> bytes:
+    return encoded_file(array or make_array(), frames, 0, **{**FORM, **changes})
+
+
+def decoded_sets(file: bytes, frames: slice | None = None) -> list[DecodedSet]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with Decoder.open(io.BytesIO(file), frames) as decoder:
+            return list(decoder)
+
+
+@pytest.mark.parametrize("shape", [(1, 2), (2, 1), (2, 2), (3, 3)])
+@pytest.mark.parametrize("maps", ["all", "alternate"])
+def test_every_camera_comes_back(shape: tuple[int, int], maps: str) -> None:
+    array = make_array(rows=shape[0], cols=shape[1])
+    found = decoded_sets(predicted_file(array, disparity_cameras=maps, qp=24))
+    assert [decoded.index for decoded in found] == [0, 1, 2]
+    for decoded in found:
+        for camera in array.real:
+            quality = luma_psnr(decoded.pictures[camera], frame_set(array, decoded.index).pictures[camera])
+            assert quality > 34, (camera, quality)
+
+
+def test_odd_sizes_and_small_maps_come_back() -> None:
+    array = make_array(95, 63)
+    for decoded in decoded_sets(predicted_file(array, disparity_scale=2, qp=24)):
+        for camera in array.real:
+            original = frame_set(array, decoded.index).pictures[camera]
+            assert decoded.pictures[camera].shape == original.shape
+            assert luma_psnr(decoded.pictures[camera], original) > 34
+
+
+def test_each_camera_is_predicted_from_those_before_it() -> None:
+    order = prediction_order(make_array(rows=2, cols=3))
+    assert order[0] == PredictedCamera((0, 1), ((0, 0),))
+    assert order[3] == PredictedCamera((1, 1), ((0, 0), (0, 1), (0, 2), (1, 0)))
+    assert len(order) == 5
+    assert prediction_order(make_array(rows=1, cols=1)) == ()
+
+
+def test_the_first_camera_and_the_maps_are_those_of_a_plain_file() -> None:
+    plain, new = (
+        {packet.track: packet.data for packet in encode(make_array(), 1, **form)[0]} for form in ({}, FORM)
+    )
+    shared = plain.keys() & new.keys()
+    assert {track.kind for track in new.keys() - shared} == {TrackKind.PREDICTED}
+    for track in shared - {Track(TrackKind.HEADER)}:
+        assert new[track] == plain[track]
+
+
+def test_viewers_see_topics_of_another_kind() -> None:
+    file = predicted_file()
+    schemas = {
+        channel.topic: schema.name
+        for schema, channel, _ in make_reader(io.BytesIO(file)).iter_messages()
+        if schema
+    }
+    assert schemas["/camera/r00_c00/video"] == "foxglove.CompressedVideo"
+    assert schemas["/camera/r01_c01/predicted"] == "mvcodec.PredictedVideo"
+    assert "/camera/r01_c01/video" not in schemas
+
+
+def test_the_header_says_who_depends_on_whom() -> None:
+    data = encode(make_array(), 1, **FORM)[0][0].data
+    document = json.loads(data)
+    assert document["version"] == 2
+    assert document["prediction"]["cameras"][2] == {"camera": [1, 1], "from": [[0, 0], [0, 1], [1, 0]]}
+    header = StreamHeader.from_json(data)
+    assert header.to_json() == data
+    assert header.predicted == prediction_order(make_array())
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"predictor": "warp-9"}, "prediction.predictor = warp-9, expected warp-1"),
+        ({"codec": "h264"}, "prediction.codec = h264, expected vp9"),
+        ({"cameras": [{"camera": [1, 1], "from": []}]}, "real cameras that are decoded before"),
+        (
+            {"cameras": [{"camera": [0, 1], "from": [[0, 1]]}]},
+            "real cameras that are decoded before",
+        ),
+        ({"cameras": [{"camera": [9, 9], "from": [[0, 0]]}]}, "expected real cameras, each once"),
+        ({"cameras": [{"camera": [1, 1]}]}, "prediction.cameras = "),
+        ({"cameras": 7}, "prediction.cameras = 7"),
+    ],
+)
+def test_headers_that_cannot_be_are_refused(change: dict[str, object], message: str) -> None:
+    document = json.loads(encode(make_array(), 1, **FORM)[0][0].data)
+    document["prediction"] |= change
+    with pytest.raises(StreamError) as caught:
+        StreamHeader.from_json(json.dumps(document).encode())
+    assert message in str(caught.value)
+
+
+def test_version_1_does_not_say_it() -> None:
+    document = json.loads(encode(make_array(), 1, **FORM)[0][0].data) | {"version": 1}
+    with pytest.raises(StreamError, match="found predicted cameras in a header of version 1"):
+        StreamHeader.from_json(json.dumps(document).encode())
+
+
+def test_random_access_and_late_join_give_the_same_pictures() -> None:
+    file = predicted_file(frames=7, gop=3)
+    whole, late = decoded_sets(file), decoded_sets(file, slice(4, 6))
+    for one, other in zip(whole[4:6], late, strict=True):
+        for camera in one.pictures:
+            np.testing.assert_array_equal(one.pictures[camera], other.pictures[camera])
+
+
+def without(packets: list[Packet], lost: Track) -> list[Packet]:
+    return [packet for packet in packets if packet.track != lost]
+
+
+@pytest.mark.parametrize(
+    ("lost", "absent"),
+    [
+        (Track(TrackKind.PREDICTED, (1, 1)), {(1, 1)}),
+        (Track(TrackKind.PREDICTED, (0, 1)), {(0, 1), (1, 0), (1, 1)}),
+        (Track(TrackKind.DISPARITY, (1, 1)), {(0, 1), (1, 0), (1, 1)}),
+    ],
+)
+def test_who_misses_a_reference_is_made_from_the_others_until_its_keyframe(
+    lost: Track, absent: set[Position]
+) -> None:
+    sets = encode(make_array(), 4, gop=2, disparity_cameras="alternate", **FORM)
+    packets = [
+        packet
+        for number, each in enumerate(sets)
+        for packet in (without(each, lost) if number == 0 else each)
+    ]
+    with pytest.warns(MvCodecWarning, match="go on without camera"):
+        found = pushed(packets)
+    assert [set(decoded.absent) for decoded in found] == [absent, absent, set(), set()]
+    whole = pushed([packet for each in sets for packet in each])
+    for one, other in zip(found[2:], whole[2:], strict=True):
+        np.testing.assert_array_equal(one.pictures[1, 1], other.pictures[1, 1])
+
+
+def test_another_prediction_is_told_and_never_shown() -> None:
+    packets = encode(make_array(), 1, **FORM)[0]
+    track = Track(TrackKind.PREDICTED, (1, 1))
+    wrong = [replace(p, data=b"\x00\x01\x02\x03" + p.data[4:]) if p.track == track else p for p in packets]
+    with pytest.warns(MvCodecWarning, match="not the encoder's, expected checksum 03020100"):
+        (found,) = pushed(wrong)
+    assert found.absent == ((1, 1),)
+
+
+def test_such_files_are_clean_and_what_remains_of_damaged_ones_too(tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    file = predicted_file(frames=6, gop=2)
+    path.write_bytes(file)
+    assert validate(path) == []
+    new = tmp_path / "new.mcap"
+    with pytest.warns(MvCodecWarning, match="cut off"):
+        result = recover(io.BytesIO(file[: len(file) * 2 // 3]), new, lambda _: None)
+    assert 0 < result.frames < 6
+    assert validate(new) == []
+    assert len(decoded_sets(new.read_bytes())) == result.frames
+
+
+def test_recover_leaves_out_what_cannot_be_predicted(tmp_path: Path) -> None:
+    from mvcodec.container import McapWriter
+
+    source, new = io.BytesIO(), tmp_path / "new.mcap"
+    lost = Track(TrackKind.PREDICTED, (0, 1))
+    with McapWriter(source) as writer:
+        for number, packets in enumerate(encode(make_array(), 4, gop=2, **FORM)):
+            writer.push(without(packets, lost) if number == 0 else packets)
+    told: list[str] = []
+    source.seek(0)
+    result = recover(source, new, lambda error: told.append(str(error)))
+    assert (result.frames, result.incomplete) == (4, 2)
+    assert any("a picture whose references are missing" in text for text in told)
+    with pytest.warns(MvCodecWarning), Decoder.open(new) as decoder:
+        found = list(decoder)
+    assert [len(decoded.absent) for decoded in found] == [3, 3, 0, 0]
+
+
+def test_settings_that_do_not_go_together_are_told() -> None:
+    with pytest.raises(SettingError, match="disparity_cameras: found none, expected maps"):
+        EncoderConfig(disparity_cameras="none", prediction="synthesis")
+    with pytest.raises(SettingError, match="prediction: found synthesis with a bit rate"):
+        EncoderConfig(bitrate_kbps=500, prediction="synthesis")
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_threads_change_no_bit(count: int) -> None:
+    packets = []
+    for threads in (2, count):
+        config = EncoderConfig(
+            qp=30, matcher=RampMatcher(), disparity_range_px=RANGE_PX, threads=threads, prediction="synthesis"
+        )
+        with Encoder(make_array(), config) as encoder:
+            packets.append([packet.data for packet in encoder.push(frame_set(make_array(), 0))])
+    assert packets[0] == packets[1]
+
+
+def test_the_commands_know_such_files(tmp_path: Path) -> None:
+    coded = tmp_path / "coded.mcap"
+    array = write_array(tmp_path / "array", 3, 3, 2)
+    options = ("--disparity-range", "0,12", "--preset", "veryfast", "--matcher", "sgbm", "--quiet")
+    succeeds("encode", array, coded, "--prediction", "synthesis", *options)
+    assert "3 cameras coded from others; /camera/r00_c00/video plays alone" in succeeds("info", coded)
+    facts = json.loads(succeeds("info", coded, "--json"))
+    assert facts["predicted"][0] == {"camera": [0, 2], "from": [[0, 0]]}
+    succeeds("validate", coded)
+    succeeds("decode", coded, tmp_path / "views", "--quiet")
+    assert len(list((tmp_path / "views").glob("*/*.png"))) == 18
+    assert read_info(coded).bits.texture > 0
+    line = fails(2, "encode", array, tmp_path / "no.mcap", "--prediction", "synthesis", "--bitrate", "500")
+    assert "--prediction: found synthesis with a bit rate" in line
