@@ -7,6 +7,7 @@ import json
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from mvcodec.errors import MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import DecodedSet
 from mvcodec.stream import Packet, PredictedCamera, StreamHeader, Track, TrackKind
 
-FORM = {"prediction": "synthesis"}
+FORM: dict[str, Any] = {"prediction": "synthesis"}
 
 
 def predicted_file(array: CameraArray | None = None, frames: int = 3, **changes: object) -> bytes:

@@ -12,8 +12,9 @@ import io
 import json
 import sys
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +27,13 @@ from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.container import McapReader, McapWriter
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.frames import DisparityMap, FrameSet, Picture
-from mvcodec.stream import TrackKind
+from mvcodec.stream import Packet, StreamHeader, Track, TrackKind
+from mvcodec.synthesis.frame_prediction import FramePrediction
+from mvcodec.video.codec import Planes
 from mvcodec.video.codecs import find_codec
+from mvcodec.video.colour import even_size
 from mvcodec.video.map_size import small_size
+from mvcodec.video.track import PredictedTrackDecoder
 
 RANGE_PX = (-3.0, 9.5)
 
@@ -94,6 +99,9 @@ CASES: dict[str, Case] = {
     "half_size_maps": Case(_nominal(2, 3, 35, 50, 10.0), (0, 1, 2), {"qp": 30, "disparity_scale": 2}),
     "alternate_maps": Case(_calibrated(), (0, 1, 2), {"qp": 32, "gop": 2, "disparity_cameras": "alternate"}),
     "no_maps": Case(_calibrated(), (0, 1, 2), {"qp": 32, "gop": 2, "disparity_cameras": "none"}),
+    "predicted": Case(
+        _calibrated(), (0, 1, 2), {"qp": 32, "gop": 2, "disparity_scale": 2, "prediction": "synthesis"}
+    ),
     "depth": Case(_calibrated(), (0, 1), {"qp": 34, "depth": True}),
     "hevc": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 30, "codec": "hevc", "gop": 2}),
     "av1": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 40, "codec": "av1", "gop": 2}),
@@ -133,6 +141,37 @@ class _Pipe(io.BytesIO):
         return False
 
 
+def _listed(planes: Planes) -> list[Planes]:
+    return [planes]
+
+
+class _Tracks:
+    """Decodes every track of a stream, predicted ones too."""
+
+    def __init__(self, header: StreamHeader) -> None:
+        codec, size = find_codec(header.codec), even_size(header.array.width, header.array.height)
+        self._header = header
+        self._predicted = {header.picture_track(each.camera): each for each in header.predicted}
+        self._alone = {track: codec.decoder() for track in header.tracks if track not in self._predicted}
+        self._others = {track: PredictedTrackDecoder(size) for track in self._predicted}
+
+    def decode(self, packets: Sequence[Packet]) -> dict[Track, Planes]:
+        """The planes of one frame set, in the order of the tracks."""
+        found = {
+            packet.track: self._alone[packet.track].push(packet.data, packet.track.topic)[0]
+            for packet in packets
+            if packet.track in self._alone
+        }
+        frame = FramePrediction(self._header, found)
+        by_track = {packet.track: packet for packet in packets}
+        for track, each in self._predicted.items():
+            prediction = frame.predict(each.camera, each.references)
+            planes = self._others[track].push(by_track[track], track.topic, partial(_listed, prediction))
+            frame.add(each.camera, planes)
+            found[track] = planes
+        return {track: found[track] for track in self._header.tracks}
+
+
 def describe(content: bytes) -> dict[str, Any]:
     """What a conformant decoder finds: stored header, and CRC-32 of planes (cropped rows, top to bottom).
 
@@ -140,24 +179,27 @@ def describe(content: bytes) -> dict[str, Any]:
     fixes bit by bit; maps by their code values; depth, where there is any, by its millimetres.
     """
     with McapReader(io.BytesIO(content)) as reader:
-        codec, array = find_codec(reader.header.codec), reader.header.array
-        map_width, map_height = small_size(array.width, array.height, reader.header.disparity_scale)
+        known, array = reader.header, reader.header.array
+        map_width, map_height = small_size(array.width, array.height, known.disparity_scale)
+        half = (slice((array.height + 1) // 2), slice((array.width + 1) // 2))
         header: dict[str, Any] = {}
-        decoders = {track: codec.decoder() for track in reader.header.tracks}
-        frames: list[dict[str, Any]] = []
+        sets: dict[int, list[Packet]] = {}
         for number, packet in reader.packets():
-            if number == len(frames):
-                frames.append({"index": packet.index, "time_ns": packet.time_ns, "crc32": {}})
             if packet.track.kind is TrackKind.HEADER:
                 header = json.loads(packet.data)
-                continue
-            (planes,) = decoders[packet.track].push(packet.data, packet.track.topic)
-            if packet.track.kind is TrackKind.DISPARITY:
+            else:
+                sets.setdefault(number, []).append(packet)
+    tracks = _Tracks(known)
+    frames: list[dict[str, Any]] = []
+    for packets in sets.values():
+        crcs = {}
+        for track, planes in tracks.decode(packets).items():
+            if track.kind is TrackKind.DISPARITY:
                 found = [planes.y[:map_height, :map_width]]
             else:
-                half = (slice((array.height + 1) // 2), slice((array.width + 1) // 2))
                 found = [planes.y[: array.height, : array.width], planes.u[half], planes.v[half]]
-            frames[number]["crc32"][packet.track.topic] = [zlib.crc32(p.tobytes()) for p in found]
+            crcs[track.topic] = [zlib.crc32(p.tobytes()) for p in found]
+        frames.append({"index": packets[0].index, "time_ns": packets[0].time_ns, "crc32": crcs})
     depth = _depth(content)
     return {"header": header, "frame_sets": frames, **({"depth_crc32": depth} if depth else {})}
 
