@@ -219,7 +219,7 @@ class Encoder:
             return None
         assert self.config.quality is not None
         quantizer = predicted_quantizer(self.config.quality, self._codec)
-        return PredictedCameras(header, self._codec, quantizer, self.config.preset)
+        return PredictedCameras(header, self._codec, quantizer, self.config.chosen_preset)
 
     def _make_header(self, frames: FrameSet) -> StreamHeader:
         span = self.config.disparity_range_px
