@@ -143,3 +143,14 @@ def test_settings_are_checked_before_anything_is_written(tmp_path: Path) -> None
         mvcodec.encode([], path)
     with pytest.raises(mvcodec.SettingError, match=r"output: found .*x\.mp4, expected a file name"):
         mvcodec.encode([GOOD], tmp_path / "x.mp4")
+
+
+def test_paths_may_be_text_everywhere(tmp_path: Path) -> None:
+    path = str(tmp_path / "x.mcap")
+    mvcodec.encode([GOOD], path, **SETTINGS)
+    copy = str(tmp_path / "copy.mcap")
+    with mvcodec.McapReader.open(path) as reader, mvcodec.McapWriter(copy) as writer:
+        writer.push([packet for _, packet in reader.packets()])
+    assert mvcodec.read_info(copy).frames == 1
+    with pytest.raises(mvcodec.InputError, match="nowhere: found nothing there"):
+        mvcodec.open_input(str(tmp_path / "nowhere"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -24,7 +25,7 @@ _Files = TypeVar("_Files")
 
 
 def open_input(
-    paths: Sequence[Path],
+    paths: Sequence[str | os.PathLike[str]] | str | os.PathLike[str],
     *,
     grid: tuple[int, int] | None = None,
     real: str = "corners",
@@ -36,7 +37,7 @@ def open_input(
     Pictures are put together by their times; what is left out or guessed is a warning.
 
     Args:
-        paths: one array folder (or its `array.json`), or rows * cols video files in row order.
+        paths: one array folder (or its `array.json`), or several: rows * cols video files in row order.
         grid: (rows, cols); needed for video files, must agree with an array folder.
         real: which cameras are real: ``corners``, ``all``, ``every:K`` or ``R,R..xC,C..``.
         timing: what is known better than the files say.
@@ -50,12 +51,13 @@ def open_input(
     timing, reading = timing or Timing(), reading or Reading()
     if not paths:
         raise SettingError("INPUT", "nothing", "an array folder, or video files and `grid`, RxC")
-    for path in paths:
+    given = [Path(path) for path in ([paths] if isinstance(paths, str | os.PathLike) else paths)]
+    for path in given:
         if not path.exists():
             raise InputError(path, "nothing there", "an array folder or a video file")
-    if len(paths) == 1 and (paths[0].is_dir() or paths[0].suffix.lower() == ".json"):
-        return _open_folder(paths[0], grid, real, timing, reading)
-    return _open_videos(paths, grid, real, timing, reading)
+    if len(given) == 1 and (given[0].is_dir() or given[0].suffix.lower() == ".json"):
+        return _open_folder(given[0], grid, real, timing, reading)
+    return _open_videos(given, grid, real, timing, reading)
 
 
 def _open_folder(

@@ -61,6 +61,8 @@ OPTIONS = {
 _SETTING = re.compile(r"(?<![-\w:.])\w+(?=$|,| )")
 _QUOTED = re.compile(r"`(\w+)`")
 
+SPECIFICATION = "NAME[:KEY=VALUE,..]"
+
 DEFAULT_SYNTHESIZER = "layered"
 
 
@@ -164,8 +166,8 @@ def add_synthesizer(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--synthesizer",
         default=DEFAULT_SYNTHESIZER,
-        metavar="NAME",
-        help=f"one of {', '.join(SYNTHESIZERS)} (default: %(default)s)",
+        metavar=SPECIFICATION,
+        help=f"one of {', '.join(SYNTHESIZERS)}; mvcodec plugins lists settings (default: %(default)s)",
     )
 
 
@@ -175,7 +177,7 @@ def add_matcher(parser: argparse.ArgumentParser) -> None:
 
     parser.add_argument(
         "--matcher",
-        metavar="NAME",
+        metavar=SPECIFICATION,
         help=f"what estimates the maps of a file that holds none; {matcher_choices()}"
         " (default: the one that the file names)",
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource
-from mvcodec.cli.arguments import disparity_qp, disparity_range, pair_of_sizes
+from mvcodec.cli.arguments import SPECIFICATION, disparity_qp, disparity_range, pair_of_sizes
 from mvcodec.cli.paths import local_path
 from mvcodec.encoding.config import AUTO
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
@@ -56,8 +56,9 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--matcher",
-        metavar="NAME",
-        help=f"{matcher_choices()} (default: what --speed has; best: {SPEEDS[FOR_FILES].matcher})",
+        metavar=SPECIFICATION,
+        help=f"{matcher_choices()}; mvcodec plugins lists settings (default: what --speed has; best:"
+        f" {SPEEDS[FOR_FILES].matcher})",
     )
     parser.add_argument(
         "--preset",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
@@ -32,9 +33,13 @@ class McapWriter(Closing):
     """
 
     def __init__(
-        self, target: BinaryIO | Path, chunk_ms: int = CHUNK_MS, listener: MessageListener | None = None
+        self,
+        target: BinaryIO | str | os.PathLike[str],
+        chunk_ms: int = CHUNK_MS,
+        listener: MessageListener | None = None,
     ) -> None:
-        self._file = ChunkedFile(target, chunk_ms, listener)
+        file = Path(target) if isinstance(target, str | os.PathLike) else target
+        self._file = ChunkedFile(file, chunk_ms, listener)
         self._rig: tuple[schemas.RigMessage, ...] = ()
         self._video_topics: tuple[str, ...] = ()
         self._codec = ""
