@@ -41,14 +41,30 @@ def write_video(
     **options: str,
 ) -> Path:
     """One H.264 file of the pictures of these numbers, at these times or at `fps`."""
+    pictures = (numbered(number, col) for number in numbers)
+    return write_frames(path, pictures, times_ms, fps=fps, form=form, **options)
+
+
+def write_frames(
+    path: Path,
+    pictures: Iterable[Picture],
+    times_ms: Sequence[int] | None = None,
+    *,
+    fps: Fraction | int = 30,
+    form: str | None = None,
+    **options: str,
+) -> Path:
+    """One H.264 file of pictures, at these times or at `fps`."""
     base = Fraction(1, 1000) if times_ms is not None else 1 / Fraction(fps)
     with av.open(str(path), "w", format=form) as out:
         settings = {"crf": "16", "preset": "ultrafast", "bf": "0"} | options
         stream = out.add_stream("libx264", rate=Fraction(fps), options=settings)
-        stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p"
+        stream.pix_fmt = "yuv420p"
         stream.codec_context.time_base = base
-        for index, number in enumerate(numbers):
-            frame = av.VideoFrame.from_ndarray(numbered(number, col), format="rgb24")
+        for index, picture in enumerate(pictures):
+            if index == 0:
+                stream.width, stream.height = picture.shape[1], picture.shape[0]
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
             frame.pts, frame.time_base = index if times_ms is None else times_ms[index], base
             out.mux(stream.encode(frame))
         out.mux(stream.encode())

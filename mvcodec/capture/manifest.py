@@ -9,6 +9,7 @@ from string import Formatter
 from typing import Any
 
 from mvcodec.array import MAX_GRID_SIDE, Calibration, Position
+from mvcodec.capture.file_patterns import pattern_files
 from mvcodec.capture.stated_times import read_times_ns
 from mvcodec.capture.truth import TruthFiles
 from mvcodec.errors import InputError, SettingError
@@ -121,15 +122,8 @@ def _pattern_views(fields: Fields, rows: int, cols: int) -> dict[Position, ViewF
     for name, count in (("row", rows), ("col", cols)):
         if count > 1 and name not in names:
             raise fields.wrong("pattern", pattern, f"{{{name}}} in it")
-    folder = Path(fields.source).parent
-    positions = [(row, col) for row in range(rows) for col in range(cols)]
-    if "frame" not in names:
-        return {(row, col): folder / pattern.format(row=row, col=col) for row, col in positions}
-    count = fields.integer("frames", 1, _MAX_FRAMES)
-    return {
-        (row, col): tuple(folder / pattern.format(row=row, col=col, frame=frame) for frame in range(count))
-        for row, col in positions
-    }
+    frames = fields.integer("frames", 1, _MAX_FRAMES) if "frame" in names else None
+    return pattern_files(Path(fields.source), pattern, names, rows, cols, frames)
 
 
 def _field_names(fields: Fields, key: str, pattern: str, allowed: set[str]) -> set[str]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeVar
 
 from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.capture.bit_depth import BitDepth
 from mvcodec.capture.manifest import DEFAULT_FPS, MANIFEST_NAME, Manifest, ViewFiles, read_manifest
+from mvcodec.capture.named_files import open_files, tell_notes
 from mvcodec.capture.reading import Reading
 from mvcodec.capture.selection import select_real
 from mvcodec.capture.shared_clock import StatedTimes, common_times
@@ -18,10 +17,8 @@ from mvcodec.capture.source import ArraySource
 from mvcodec.capture.timing import Timing
 from mvcodec.capture.video_input import VideoView
 from mvcodec.capture.view_array import PictureView, ViewArray, ViewReader, check_sizes
-from mvcodec.errors import InputError, MvCodecWarning, SettingError
+from mvcodec.errors import InputError, SettingError
 from mvcodec.workers import run_all
-
-_Files = TypeVar("_Files")
 
 
 def open_input(
@@ -37,8 +34,8 @@ def open_input(
     Pictures are put together by their times; what is left out or guessed is a warning.
 
     Args:
-        paths: one array folder (or its `array.json`), or several: rows * cols video files in row order.
-        grid: (rows, cols); needed for video files, must agree with an array folder.
+        paths: one array folder (or its `array.json`), or rows * cols videos or pictures in row order.
+        grid: (rows, cols); needed for several files, must agree with an array folder.
         real: which cameras are real: ``corners``, ``all``, ``every:K`` or ``R,R..xC,C..``.
         timing: what is known better than the files say.
         reading: how pictures are read, and what happens to unreadable ones.
@@ -69,7 +66,7 @@ def _open_folder(
             "grid", _grid_text(grid), f"{manifest.rows}x{manifest.cols} as {manifest.path} says"
         )
     depth = BitDepth(str(path), reading.bits)
-    views = _open_views(manifest.views, lambda files: _open_view(files, depth))
+    views = _open_views(manifest, depth)
     stated = StatedTimes(manifest.path, manifest.fps, manifest.times_ns, manifest.first_frame)
     fps, pairing = common_times(str(path), views, stated, timing, DEFAULT_FPS)
     array = _folder_array(manifest, views[0, 0].size, fps, real)
@@ -128,19 +125,12 @@ def _folder_array(manifest: Manifest, size: tuple[int, int], fps: float, real: s
 def _open_videos(
     paths: Sequence[Path], grid: tuple[int, int] | None, real: str, timing: Timing, reading: Reading
 ) -> ViewArray:
-    for path in paths:
-        if path.is_dir():
-            raise InputError(path, "a folder among several inputs", "video files only, or one array folder")
-    if grid is None:
-        raise SettingError("grid", "nothing", f"RxC for {len(paths)} video files in row order")
-    rows, cols = grid
-    if rows < 1 or cols < 1 or rows * cols != len(paths):
-        raise SettingError("grid", _grid_text(grid), f"RxC with R*C = {len(paths)}, the number of files")
-    files = {(row, col): paths[row * cols + col] for row in range(rows) for col in range(cols)}
-    views = _open_views(files, VideoView)
-    first = views[0, 0]
     name = str(paths[0]) if len(paths) == 1 else f"{paths[0]} ... {paths[-1]}"
-    fps, pairing = common_times(name, views, StatedTimes(), timing, None)
+    (rows, cols), views = open_files(paths, name, grid, reading)
+    tell_notes(views)
+    first = views[0, 0]
+    default_fps = None if any(view.times_ns for view in views.values()) else DEFAULT_FPS
+    fps, pairing = common_times(name, views, StatedTimes(), timing, default_fps)
     real_rows, real_cols = select_real(real, rows, cols)
     width, height = first.size
     calibration = Calibration.nominal(width, height)
@@ -158,19 +148,14 @@ def _open_videos(
     return ViewArray(name, array, views, pairing, on_unreadable=reading.on_unreadable)
 
 
-def _open_views(
-    files: dict[Position, _Files], opener: Callable[[_Files], ViewReader]
-) -> dict[Position, ViewReader]:
-    views = dict(zip(files, run_all(opener, files.values()), strict=True))
+def _open_views(manifest: Manifest, depth: BitDepth) -> dict[Position, ViewReader]:
+    def opened(files: ViewFiles) -> ViewReader:
+        return VideoView(files) if isinstance(files, Path) else PictureView(files, depth)
+
+    views = dict(zip(manifest.views, run_all(opened, manifest.views.values()), strict=True))
     check_sizes(views)
-    for view in views.values():
-        for note in view.notes:
-            warnings.warn(f"{view.path}: {note}", MvCodecWarning, stacklevel=3)
+    tell_notes(views)
     return views
-
-
-def _open_view(files: ViewFiles, depth: BitDepth) -> ViewReader:
-    return VideoView(files) if isinstance(files, Path) else PictureView(files, depth)
 
 
 def _grid_text(grid: tuple[int, int] | None) -> str:

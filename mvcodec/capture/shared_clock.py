@@ -10,7 +10,6 @@ from pathlib import Path
 from mvcodec.array import Position
 from mvcodec.capture.pairing import Pairing, pair_pictures
 from mvcodec.capture.timing import Timing, rate_of_times
-from mvcodec.capture.video_input import VideoView
 from mvcodec.capture.view_array import ViewReader
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
 from mvcodec.stream import view_name
@@ -95,9 +94,7 @@ def _rate(
     stated: StatedTimes,
     default_fps: float | None,
 ) -> float:
-    videos = {
-        view: reader for view, reader in views.items() if isinstance(reader, VideoView) and reader.fps > 0
-    }
+    videos = {view: reader for view, reader in views.items() if reader.fps > 0}
     timed = [reader.fps for view, reader in videos.items() if view in known and view not in given]
     if timed:
         # The slowest camera decides how many frame sets there are.
@@ -139,7 +136,7 @@ def _names(view: Position, reader: ViewReader) -> set[str]:
 
 def _labels(views: Mapping[Position, ViewReader]) -> dict[Position, str]:
     """What to call the views: their files' names where these differ, else their places."""
-    names = {view: reader.path.name for view, reader in views.items() if isinstance(reader, VideoView)}
+    names = {view: reader.path.name for view, reader in views.items() if reader.fps > 0}
     if len(set(names.values())) == len(views):
         return names
     return {view: view_name(view) for view in views}

@@ -36,6 +36,11 @@ class ViewReader(Protocol):
         ...
 
     @property
+    def fps(self) -> float:
+        """Pictures a second, as the file says; 0 where nothing does."""
+        ...
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What is unusual about the files, one line each."""
         ...
@@ -64,6 +69,7 @@ class PictureView:
         self.path = paths[0]
         self.count = len(paths)
         self.times_ns: tuple[int, ...] | None = None
+        self.fps = 0.0
         facts = picture_facts(paths[0])
         self.size = facts.size
         self.notes = ("how opaque its pixels are is left out",) if facts.alpha else ()

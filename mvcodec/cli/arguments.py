@@ -6,6 +6,7 @@ import argparse
 import math
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
 from mvcodec.errors import SettingError
 from mvcodec.stream import StreamHeader
@@ -51,6 +52,7 @@ OPTIONS = {
     "scene": "--scene",
     "seed": "--seed",
     "size": "--size",
+    "split": "--split",
     "style": "--style",
     "tolerance_ms": "--tolerance-ms",
     "topics": "--topics",
@@ -86,6 +88,16 @@ def join_negative_values(argv: Sequence[str]) -> list[str]:
         else:
             joined.append(argument)
     return joined
+
+
+def names_as_paths(argv: Sequence[str]) -> list[str]:
+    """Turn ``-cam.mp4``, which argparse would take for options, into ``./-cam.mp4`` where that is a file."""
+
+    def path(argument: str) -> str:
+        is_name = argument.startswith("-") and len(argument) > 2 and Path(argument).is_file()
+        return f"./{argument}" if is_name else argument
+
+    return [path(argument) for argument in argv]
 
 
 def pair_of_sizes(text: str) -> tuple[int, int]:

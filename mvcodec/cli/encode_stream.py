@@ -139,6 +139,8 @@ def _run(
 
 @contextmanager
 def _opened(arguments: argparse.Namespace) -> Iterator[Recording]:
+    if arguments.split is not None:
+        raise SettingError("split", "with a recording", "an input of video or picture files")
     timing = timing_of(arguments)
     settings = RecordingSettings(
         topics=_topic_grid(arguments),

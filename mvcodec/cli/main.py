@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 import mvcodec
-from mvcodec.cli.arguments import as_option, in_options, join_negative_values
+from mvcodec.cli.arguments import as_option, in_options, join_negative_values, names_as_paths
 from mvcodec.cli.standard_streams import ReaderGone, checked_streams
 from mvcodec.cli.warning_lines import WarningLines
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
@@ -79,7 +79,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str]) -> int:
-    parsed = _parser(arguments).parse_args(join_negative_values(arguments))
+    parsed = _parser(arguments).parse_args(join_negative_values(names_as_paths(arguments)))
     try:
         _use_threads(getattr(parsed, "threads", None))
         _module(parsed.command).run(parsed)

@@ -6,12 +6,13 @@ import argparse
 import warnings
 
 from mvcodec.capture.reading import Reading
+from mvcodec.cli.arguments import pair_of_sizes
 from mvcodec.cli.safety import add_on_error
 from mvcodec.errors import InputError, MvCodecWarning
 
 
 def add_picture_options(parser: argparse.ArgumentParser) -> None:
-    """``--bits`` and ``--on-error``."""
+    """``--bits``, ``--split`` and ``--on-error``."""
     parser.add_argument(
         "--bits",
         type=int,
@@ -19,12 +20,19 @@ def add_picture_options(parser: argparse.ArgumentParser) -> None:
         help="bits that pictures of 16 bits really use, 8..16 (default: as their files say, or as their"
         " values need)",
     )
+    parser.add_argument(
+        "--split",
+        type=pair_of_sizes,
+        metavar="RxC",
+        help="views in each picture of the files: 1x2 side by side, 2x1 top and bottom, or a mosaic"
+        " (default: 1x1, and what a quilt's name says)",
+    )
     add_on_error(parser, "stop", "at a picture that cannot be read: leave its frame set out, or stop")
 
 
 def reading_of(arguments: argparse.Namespace) -> Reading:
     """What the options say."""
-    return Reading(arguments.bits, _warn if arguments.on_error == "skip" else None)
+    return Reading(arguments.bits, _warn if arguments.on_error == "skip" else None, arguments.split)
 
 
 def _warn(error: InputError) -> None:
