@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +28,14 @@ class FrameSet:
         index: frame number in the input (kept when only a range of it is coded).
         time_ns: capture time, integer nanoseconds.
         pictures: uint8 (H, W, 3) RGB by grid position.
+        given: disparity that the input itself has, by grid position, for the baseline of one cell, px of
+            the pictures; at their size or smaller in proportion.
     """
 
     index: int
     time_ns: int
     pictures: Mapping[Position, Picture]
+    given: Mapping[Position, DisparityMap] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,11 +6,27 @@ import itertools
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from string import Formatter
 
 from mvcodec.array import Position
 from mvcodec.errors import MvCodecWarning
+from mvcodec.fields import Fields
 
 NUMBERS = ("row", "col", "frame")
+
+
+def pattern_names(fields: Fields, key: str, pattern: str, allowed: set[str]) -> set[str]:
+    """The names between braces; InputError where there are others or they can't be filled in."""
+    expected = " ".join(f"{{{name}}}" for name in sorted(allowed))
+    try:
+        names = {name for _, name, _, _ in Formatter().parse(pattern) if name is not None}
+        if names <= allowed:
+            pattern.format(**dict.fromkeys(names, 0))
+    except (ValueError, IndexError, KeyError) as error:
+        raise fields.wrong(key, pattern, f"a pattern of {expected} ({error})") from None
+    if not names <= allowed:
+        raise fields.wrong(key, pattern, f"no other fields than {expected}")
+    return names
 
 
 def pattern_files(

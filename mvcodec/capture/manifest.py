@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from string import Formatter
 from typing import Any
 
 from mvcodec.array import MAX_GRID_SIDE, Calibration, Position
-from mvcodec.capture.file_patterns import pattern_files
+from mvcodec.capture.file_patterns import pattern_files, pattern_names
+from mvcodec.capture.given_maps import GivenFiles, read_given
 from mvcodec.capture.stated_times import read_times_ns
 from mvcodec.capture.truth import TruthFiles
 from mvcodec.errors import InputError, SettingError
@@ -38,6 +38,7 @@ class Manifest:
         name: of the scene; the folder's where the file states none.
         rho, calibration, disparity_per_step_px: as in CameraArray; None where not stated.
         truth: ground truth by view.
+        given: disparity or depth of the views' pictures, to be coded in place of what matching finds.
         real: the coded views, where `decode` wrote the folder.
         first_frame: index in the original of frame 0.
     """
@@ -53,6 +54,7 @@ class Manifest:
     calibration: Calibration | None = None
     disparity_per_step_px: tuple[float, float] | None = None
     truth: dict[Position, TruthFiles] = field(default_factory=dict)
+    given: GivenFiles | None = None
     real: tuple[Position, ...] | None = None
     first_frame: int = 0
 
@@ -83,6 +85,7 @@ def read_manifest(path: Path) -> Manifest:
         disparity_per_step_px=_disparity_range(fields),
         truth=_truth(fields, rows, cols),
         real=_real(fields, rows, cols),
+        given=read_given(fields, rows, cols),
         first_frame=fields.integer("first_frame", 0, _MAX_FRAMES, 0),
     )
 
@@ -118,26 +121,12 @@ def _view_files(fields: Fields, key: str, files: Any) -> ViewFiles:
 
 def _pattern_views(fields: Fields, rows: int, cols: int) -> dict[Position, ViewFiles]:
     pattern = fields.text("pattern")
-    names = _field_names(fields, "pattern", pattern, {"row", "col", "frame"})
+    names = pattern_names(fields, "pattern", pattern, {"row", "col", "frame"})
     for name, count in (("row", rows), ("col", cols)):
         if count > 1 and name not in names:
             raise fields.wrong("pattern", pattern, f"{{{name}}} in it")
     frames = fields.integer("frames", 1, _MAX_FRAMES) if "frame" in names else None
     return pattern_files(Path(fields.source), pattern, names, rows, cols, frames)
-
-
-def _field_names(fields: Fields, key: str, pattern: str, allowed: set[str]) -> set[str]:
-    """The names between braces; InputError where there are others or they can't be filled in."""
-    expected = " ".join(f"{{{name}}}" for name in sorted(allowed))
-    try:
-        names = {name for _, name, _, _ in Formatter().parse(pattern) if name is not None}
-        if names <= allowed:
-            pattern.format(**dict.fromkeys(names, 0))
-    except (ValueError, IndexError, KeyError) as error:
-        raise fields.wrong(key, pattern, f"a pattern of {expected} ({error})") from None
-    if not names <= allowed:
-        raise fields.wrong(key, pattern, f"no other fields than {expected}")
-    return names
 
 
 def read_calibration(path: Path) -> Calibration:
@@ -204,7 +193,7 @@ def _truth_names(inner: Fields) -> tuple[str, ...]:
     if not names or not all(isinstance(name, str) and name for name in names):
         raise inner.wrong("file", files, expected)
     if len(names) == 1:
-        _field_names(inner, "file", names[0], {"frame"})
+        pattern_names(inner, "file", names[0], {"frame"})
     return tuple(names)
 
 

@@ -65,6 +65,8 @@ def _open_folder(
         raise SettingError(
             "grid", _grid_text(grid), f"{manifest.rows}x{manifest.cols} as {manifest.path} says"
         )
+    if manifest.given is not None and manifest.given.kind == "depth" and manifest.calibration is None:
+        raise InputError(manifest.path, "depth without calibration", "calibration, which makes it disparity")
     depth = BitDepth(str(path), reading.bits)
     views = _open_views(manifest, depth)
     stated = StatedTimes(manifest.path, manifest.fps, manifest.times_ns, manifest.first_frame)
@@ -82,6 +84,7 @@ def _open_folder(
         pairing,
         on_unreadable=reading.on_unreadable,
         truth=manifest.truth,
+        given=manifest.given,
         first_frame=manifest.first_frame,
         listed_real=manifest.real,
     )

@@ -18,6 +18,7 @@ class ArraySource(Protocol):
         array: geometry, with the real cameras that were selected.
         frame_count: frame sets in the input.
         first_frame: index in the original of frame 0 (0 unless `decode` wrote the input).
+        has_given: its frame sets bring disparity of their own.
         listed_real: the coded views that the input lists, where `decode` wrote it; else None.
     """
 
@@ -35,6 +36,9 @@ class ArraySource(Protocol):
 
     @property
     def listed_real(self) -> tuple[Position, ...] | None: ...
+
+    @property
+    def has_given(self) -> bool: ...
 
     def frame_sets(
         self, frames: slice | None = None, views: Collection[Position] | None = None

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.capture.bit_depth import BitDepth
+from mvcodec.capture.given_maps import GivenFiles, GivenOfFrame
 from mvcodec.capture.pairing import Pairing
 from mvcodec.capture.picture_files import look_at_depth, picture_facts, read_picture, wrong_size
 from mvcodec.capture.reading import OnUnreadable
@@ -100,6 +101,7 @@ class ViewArray:
         pairing: which of their pictures belong together.
         on_unreadable: told of a picture that cannot be read, whose frame set is left out; None: it is raised.
         truth: ground truth by view.
+        given: disparity or depth of the views' pictures; None: there is none.
         first_frame, listed_real: as in ArraySource.
     """
 
@@ -112,6 +114,7 @@ class ViewArray:
         *,
         on_unreadable: OnUnreadable | None = None,
         truth: Mapping[Position, TruthFiles] | None = None,
+        given: GivenFiles | None = None,
         first_frame: int = 0,
         listed_real: tuple[Position, ...] | None = None,
     ) -> None:
@@ -119,7 +122,8 @@ class ViewArray:
         self.first_frame, self.listed_real = first_frame, listed_real
         self.frame_count = len(pairing.times_ns)
         self._views, self._pairing, self._truth = views, pairing, dict(truth or {})
-        self._on_unreadable = on_unreadable
+        self._on_unreadable, self._given = on_unreadable, given
+        self.has_given = given is not None
 
     def frame_sets(
         self, frames: slice | None = None, views: Collection[Position] | None = None
@@ -155,11 +159,18 @@ class ViewArray:
                     ahead = start()
                 pictures = {position: picture for position, picture in found.items() if picture is not None}
                 if len(pictures) == len(found):
-                    yield FrameSet(self.first_frame + number, self._pairing.times_ns[number], pictures)
+                    index, time_ns = self.first_frame + number, self._pairing.times_ns[number]
+                    yield FrameSet(index, time_ns, pictures, self._given_of(number, positions))
         finally:
             for job in ahead.values():
                 job.cancel()
             settle(ahead.values())
+
+    def _given_of(self, number: int, positions: tuple[Position, ...]) -> Mapping[Position, DisparityMap]:
+        if self._given is None:
+            return {}
+        numbers = {view: self._pairing.numbers[view][number] for view in positions}
+        return GivenOfFrame(self._given, numbers, self.array)
 
     def truth(self, view: Position, frame: int) -> DisparityMap | None:
         """See ArraySource."""

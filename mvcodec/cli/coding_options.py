@@ -17,6 +17,7 @@ from mvcodec.encoding.speed import FOR_FILES, FOR_LIVE, SPEEDS
 from mvcodec.frames import FrameSet
 from mvcodec.layers.refinement import matcher_choices
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
+from mvcodec.stereo.given import given_range
 from mvcodec.stream import DISPARITY_CAMERAS, PREDICTIONS
 from mvcodec.video.codec import PRESETS
 from mvcodec.video.codecs import CODECS
@@ -138,11 +139,17 @@ def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: 
 
 
 def find_range(
-    source: ArraySource, chosen: range, option: tuple[float, float] | str | None
+    source: ArraySource, chosen: range, option: tuple[float, float] | str | None, given: bool = False
 ) -> tuple[float, float]:
-    """The range of disparities, px, that ``--disparity-range`` asks for, estimated where it gives none."""
+    """The range of disparities, px, that ``--disparity-range`` asks for, estimated where it gives none.
+
+    Args:
+        given: the maps that the input has will be coded: their own range counts.
+    """
     if isinstance(option, tuple):
         return option
+    if given:
+        return given_range(_samples(source, chosen))
     hint = None if option == "auto" else source.array.disparity_hint_px
     return estimate_range(source.array, _samples(source, chosen), hint)
 

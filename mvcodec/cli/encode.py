@@ -42,6 +42,8 @@ from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.output.live_view import LiveView
 
 SUFFIX = ".mcap"
+GIVEN = "given"
+"""The matcher that takes what the input has."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -132,7 +134,11 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
             f"{source.name}: no calibration given; nominal values stand in (f = picture width, 0.1 m a step)"
         )
         warnings.warn(text, MvCodecWarning, stacklevel=2)
-    range_px = find_range(source, chosen, arguments.disparity_range)
+    given = str(config.chosen_matcher).split(":")[0] == GIVEN
+    if source.has_given and not given:
+        text = f"{source.name}: it has disparity or depth of its own, which --matcher {GIVEN} codes"
+        warnings.warn(text, MvCodecWarning, stacklevel=2)
+    range_px = find_range(source, chosen, arguments.disparity_range, given)
     if arguments.dry_run:
         print(plan(array, config, chosen, range_px))
         return None

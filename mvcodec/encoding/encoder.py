@@ -16,7 +16,7 @@ from mvcodec.encoding.config import EncoderConfig, default_gop, find_matcher, ma
 from mvcodec.encoding.predicted_cameras import PredictedCameras, predicted_quantizer, prediction_order
 from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet, Picture
-from mvcodec.stereo.matcher import Matcher, SelectiveMatcher
+from mvcodec.stereo.matcher import FrameMatcher, Matcher, SelectiveMatcher
 from mvcodec.stream import (
     HEADER_TRACK,
     Packet,
@@ -165,7 +165,10 @@ class Encoder:
         if not (self._header.map_cameras or self.config.depth):
             return
         range_px = self._header.disparity_range_px
-        if isinstance(self._matcher, SelectiveMatcher) and not self.config.depth:
+        if isinstance(self._matcher, FrameMatcher):
+            cameras = self.array.real
+            maps = self._matcher.match_frames(self.array, frames, range_px)
+        elif isinstance(self._matcher, SelectiveMatcher) and not self.config.depth:
             cameras = self._header.map_cameras
             maps = self._matcher.match_cameras(self.array, pictures, range_px, cameras, keyframe)
         else:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.frames import DisparityMap, Picture
+from mvcodec.frames import DisparityMap, FrameSet, Picture
 
 
 class PairMatcher(Protocol):
@@ -49,6 +49,17 @@ class SelectiveMatcher(Protocol):
             fresh: nothing may depend on earlier frame sets, as it may otherwise. So it is at keyframes, for
                 segments that are coded apart.
         """
+        ...
+
+
+@runtime_checkable
+class FrameMatcher(Protocol):
+    """A Matcher that looks at more of a frame set than its pictures."""
+
+    def match_frames(
+        self, array: CameraArray, frames: FrameSet, range_px: tuple[float, float]
+    ) -> dict[Position, DisparityMap]:
+        """Disparity of every real camera, as `Matcher.match` has it."""
         ...
 
 

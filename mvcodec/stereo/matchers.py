@@ -8,6 +8,7 @@ from mvcodec.errors import SettingError
 from mvcodec.plugins import Plugin, PluginTable
 from mvcodec.stereo.adcensus import AdCensus, AdCensusSettings
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
+from mvcodec.stereo.given import Given, GivenSettings
 from mvcodec.stereo.joint import Joint
 from mvcodec.stereo.joint_settings import BALANCED, REALTIME, JointSettings
 from mvcodec.stereo.matcher import Matcher, PairMatcher
@@ -42,6 +43,7 @@ MATCHERS: dict[str, Plugin] = {
     "adcensus": Plugin(
         lambda made: Pairwise(AdCensus(made)), AdCensusSettings, "AD-Census (Mei et al. 2011) of pairs"
     ),
+    "given": Plugin(Given, GivenSettings, "no matching: disparity or depth that the input already has"),
 }
 
 MATCHER_PLUGINS = PluginTable("matcher", MATCHERS, "mvcodec.matchers")
