@@ -6,8 +6,10 @@ import argparse
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
+from small_arrays import write_array
 
 from mvcodec.cli.arguments import (
     disparity_qp,
@@ -18,7 +20,7 @@ from mvcodec.cli.arguments import (
     positive_int,
     view,
 )
-from mvcodec.cli.main import COMMANDS, main
+from mvcodec.cli.main import COMMANDS, command_parser, main
 
 
 @pytest.mark.parametrize(
@@ -107,15 +109,22 @@ def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixtu
     ("arguments", "complaint"),
     [
         ([], "required: COMMAND"),
-        (["transmogrify"], "invalid choice: 'transmogrify'"),
+        (["transmogrify"], "found 'transmogrify', expected one of sample"),
         (["encode", "in"], "required: OUT.mcap"),
         (["encode", "in", "o.mcap", "--qp", "30", "--crf", "20"], "not allowed with"),
-        (["encode", "in", "o.mcap", "--qp", "many"], "--qp: invalid int value"),
+        (["encode", "in", "o.mcap", "--qp", "many"], "--qp: found 'many', expected a whole number"),
         (["encode", "in", "o.mcap", "--disparity-range", "20,-25"], "--disparity-range: found '20,-25'"),
-        (["decode", "in", "out", "--format", "gif"], "invalid choice: 'gif'"),
+        (["decode", "in", "out", "--format", "gif"], "--format: found 'gif', expected one of array"),
         (["decode", "in", "out", "--grid", "3x3", "--view", "0,0"], "not allowed with"),
         (["compare", "a", "b", "--frames", "3"], "--frames: found '3'"),
         (["sample", "out", "--size", "big"], "--size: found 'big'"),
+        (["decod", "in", "out"], "did you mean decode?"),
+        (["encode", "in", "o.mcap", "--codec", "hvec"], "did you mean hevc?"),
+        (
+            ["encode", "in", "o.mcap", "--gird", "2x2"],
+            "which the command does not take; did you mean --grid?",
+        ),
+        (["encode", "in", "o.mcap", "--bitrate", "fast"], "--bitrate: found 'fast'"),
     ],
 )
 def test_arguments_that_do_not_fit_leave_with_2_and_one_line(
@@ -125,6 +134,7 @@ def test_arguments_that_do_not_fit_leave_with_2_and_one_line(
         main(arguments)
     assert left.value.code == 2
     message = capsys.readouterr().err
+    assert message.startswith("mvcodec: error: ")
     assert complaint in message
     assert message.count("\n") == 1
 
@@ -138,3 +148,21 @@ def test_help_does_not_load_what_only_the_commands_need() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == ""
+
+
+def test_words_that_everyone_uses_are_understood() -> None:
+    encode = command_parser("encode")
+    parsed = encode.parse_args(["in", "o.mcap", "--codec", "H265", "--bitrate", "2.5M"])
+    assert (parsed.codec, parsed.bitrate) == ("hevc", 2500)
+    assert encode.parse_args(["in", "o.mcap", "--bitrate", "800k"]).bitrate == 800
+    assert command_parser("sample").parse_args(["out", "--size", "1080p"]).size == (1920, 1080)
+
+
+def test_a_misspelt_name_in_the_library_s_lists_gets_a_suggestion(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = write_array(tmp_path / "array", frames=1)
+    assert main(["encode", str(folder), str(tmp_path / "x.mcap"), "--matcher", "jiont"]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith("mvcodec: error: --matcher: found jiont, expected one of joint")
+    assert message.endswith("did you mean joint?\n")

@@ -90,7 +90,7 @@ def test_json_comes_before_the_line_about_damage(flipped: Path, cut: Path, tmp_p
     assert done.returncode == 1
     assert "at 1.000..1.400 s: found damage" in done.stderr
     assert json.loads(done.stdout)["frames"] == 2 * GOP
-    done = mvcodec("decode", cut, tmp_path / "out", *QUICK, "--json")
+    done = mvcodec("decode", cut, tmp_path / "out", *QUICK, "--json", "-y")
     assert done.returncode == 0
     assert "cut off after" in done.stderr
     assert json.loads(done.stdout)["bytes"] == cut.stat().st_size

@@ -105,7 +105,7 @@ def test_a_quilt_gets_the_name_that_viewers_want_and_tells_it(coded: Path, tmp_p
     assert told == f"{path}\n"
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
     assert read_picture(path).shape == (2 * HEIGHT, 3 * WIDTH, 3)
-    assert succeeds("render", coded, path, "--style", "quilt", "--grid", "2x3", *QUICK) == ""
+    assert succeeds("render", coded, path, "--style", "quilt", "--grid", "2x3", "-y", *QUICK) == ""
 
 
 def test_slice_and_refocus(coded: Path, tmp_path: Path) -> None:

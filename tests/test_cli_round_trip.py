@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,9 +12,10 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from command_line import mvcodec, succeeds
+from command_line import fails, mvcodec, succeeds
 from small_arrays import FAR_PX, HEIGHT, NEAR_PX, WIDTH, picture, write_array
 
+from mvcodec import __version__
 from mvcodec.array import Calibration
 from mvcodec.capture import open_input
 from mvcodec.evaluation.metrics import psnr
@@ -139,16 +141,66 @@ def test_mosaics(coded: Path, tmp_path: Path) -> None:
     assert sheet.shape == (3 * HEIGHT, 3 * WIDTH, 3)
     assert psnr(sheet[-HEIGHT:, :WIDTH], picture((2, 0), 1)) > 38
     (tmp_path / "all.mp4").write_bytes(b"old")
-    succeeds("decode", coded, tmp_path / "all.mp4", "--format", "mosaic")
+    assert "-y overwrites it" in fails(1, "decode", coded, tmp_path / "all.mp4")
+    succeeds("decode", coded, tmp_path / "all.mp4", "-y")
     video = open_input([tmp_path / "all.mp4"], grid=(1, 1), real="all")
     assert (video.frame_count, video.array.width) == (FRAMES, 3 * WIDTH)
 
 
-def test_an_existing_folder_is_written_into(coded: Path, tmp_path: Path) -> None:
-    (tmp_path / "mine.txt").write_text("keep")
-    succeeds("decode", coded, tmp_path, "--frames", ":1")
-    assert (tmp_path / "mine.txt").read_text() == "keep"
-    assert manifest(tmp_path)["frames"] == 1
+def test_a_folder_is_overwritten_where_that_is_asked_and_nothing_else_is_in_it(
+    coded: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    succeeds("decode", coded, out, "--frames", ":1")
+    assert "it holds array.json already; -y overwrites it" in fails(1, "decode", coded, out)
+    succeeds("decode", coded, out, "--frames", ":2", "-y")
+    assert manifest(out)["frames"] == 2
+    (out / "mine.txt").write_text("keep")
+    assert "it holds other things, such as mine.txt" in fails(1, "decode", coded, out, "-y")
+    assert (out / "mine.txt").read_text() == "keep"
+
+
+def test_the_ending_says_what_is_written_and_the_end_tells_it(coded: Path, tmp_path: Path) -> None:
+    one = tmp_path / "one.mp4"
+    done = mvcodec("decode", coded, one, "--view", "1,0.5", "--frames", "1:")
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr == f"mvcodec: {one}: {FRAMES - 1} frames of 1 view, 10 fps, 0.30 s\n"
+    video = open_input([one], grid=(1, 1), real="all")
+    assert (video.frame_count, video.array.width, video.array.height) == (FRAMES - 1, WIDTH, HEIGHT)
+    assert mvcodec("decode", coded, tmp_path / "x.mcap", "--frames", ":1", "--quiet").stderr == ""
+    assert "clean" in succeeds("validate", tmp_path / "x.mcap")
+    succeeds("decode", coded, tmp_path / "o.mp4", "--format", "png", "--view", "0,0", "--frames", ":1")
+    assert len(list((tmp_path / "o.mp4").glob("*/000000.png"))) == 1
+
+
+def test_a_file_is_compared_as_what_it_decodes_to(array: Path, coded: Path, tmp_path: Path) -> None:
+    succeeds("decode", coded, tmp_path / "out", "--frames", "1:3")
+    folder = json.loads(succeeds("compare", array, tmp_path / "out", "--json"))
+    assert json.loads(succeeds("compare", array, coded, "--frames", "1:3", "--json")) == folder
+    assert "--provenance" in fails(2, "compare", array, coded, "--provenance", tmp_path / "out")
+
+
+def test_encode_tells_its_bits_beside_simulcast(array: Path, tmp_path: Path) -> None:
+    out = tmp_path / "x.mcap"
+    text = succeeds("encode", array, out, "--frames", ":1", "--matcher", "sgbm")
+    assert re.search(r"; about \d+% of all 9 views as simulcast, going by the real ones\n$", text)
+    again = succeeds("encode", array, out, "--frames", ":1", "--matcher", "sgbm", "-y", "--json")
+    info = json.loads(again)
+    assert info["simulcast_bits_estimated"] == pytest.approx(info["bits"]["texture"] * 9 / 4, abs=1)
+    alone = succeeds("encode", array, out, "--frames", ":1", "--real", "all", "-y", "--matcher", "sgbm")
+    assert "simulcast" not in alone
+
+
+def test_info_states_how_a_file_was_made_and_how_long_it_plays(coded: Path) -> None:
+    info = json.loads(succeeds("info", coded, "--json"))
+    assert (info["codec"], info["rate"], info["matcher"]) == ("h264", {"qp": 22}, "joint")
+    assert info["encoder"] == f"mvcodec {__version__}"
+    assert info["duration_s"] == pytest.approx(FRAMES / 10)
+    assert info["megabytes"] == coded.stat().st_size / 1e6
+    assert info["mbit_per_s"] == pytest.approx(8 * info["megabytes"] / info["duration_s"])
+    text = succeeds("info", coded)
+    for part in ("h264, QP 22", "joint", f"mvcodec {__version__}", "0.40 s", "Mbit/s"):
+        assert part in text
 
 
 def test_every_setting_at_once(array: Path, tmp_path: Path) -> None:

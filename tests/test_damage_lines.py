@@ -41,7 +41,7 @@ def test_warnings_of_few_places_are_all_shown_and_each_topic_is_a_kind_of_its_ow
         for index, packets in enumerate(coded_sets(24, gop=1))
     ]
     path.write_bytes(written(sets))
-    lines = mvcodec("decode", path, tmp_path / "out", "--quiet").stderr.splitlines()
+    lines = mvcodec("decode", path, tmp_path / "out", "--quiet", "-y").stderr.splitlines()
     for camera in ("r00_c00", "r00_c01"):
         gone = [line for line in lines if f"/camera/{camera}/video" in line]
         assert len(gone) == SHOWN + 1

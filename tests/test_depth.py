@@ -134,9 +134,9 @@ def test_the_commands_want_a_calibration(tmp_path: Path) -> None:
     (tmp_path / "calibration.json").write_text(text)
     calibrated = ("--calibration", tmp_path / "calibration.json")
     succeeds("export-points", out, tmp_path / "x.ply", *calibrated, "--stride", "2")
-    assert mvcodec("encode", array, out, "--depth", "raw16", *calibrated, *fast).stderr == ""
+    assert mvcodec("encode", array, out, "--depth", "raw16", "-y", *calibrated, *fast).stderr == ""
     (tmp_path / "calibration.json").write_text('{"fx_px": 80}')
-    assert "fy_px" in fails(1, "encode", array, out, *calibrated)
+    assert "fy_px" in fails(1, "encode", array, out, "-y", *calibrated)
 
 
 def test_points_are_exported_as_ply_and_as_point_clouds(tmp_path: Path) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import command_pages
+import docstring_names
 import pytest
 
 from mvcodec.cli.main import COMMANDS, command_parser
@@ -65,12 +68,20 @@ def test_the_page_of_the_command_line_has_every_option_with_its_help(name: str) 
     parser = command_parser(name)
     section = command_pages.command_text(name, parser)
     assert section.startswith(f"## mvcodec {name}\n")
-    for action in parser._actions:
+    for action in options_of(parser):
         assert action.help, f"{action.dest} has no help"
-        if action.dest != "help":
-            words = action.option_strings or [str(action.metavar)]
-            assert all(f"`{word}" in section for word in words)
-    assert section.count("\n| ") == len(parser._actions)  # --help aside, and the title
+        words = action.option_strings or [str(action.metavar).replace("|", "\\|")]
+        assert all(f"`{word}" in section for word in words)
+
+
+def options_of(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """Those of a command and of the commands below it, --help aside."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                yield from options_of(below)
+        elif action.dest != "help":
+            yield action
 
 
 def test_the_array_folders_of_the_documents_are_read(tmp_path: Path) -> None:
@@ -82,3 +93,12 @@ def test_the_array_folders_of_the_documents_are_read(tmp_path: Path) -> None:
         (tmp_path / "array.json").write_text(text)
         manifest = read_manifest(tmp_path / "array.json")
         assert len(manifest.views) == manifest.rows * manifest.cols
+
+
+def test_names_that_are_explained_together_are_taken_apart() -> None:
+    text = "Args:\n    row, col: the place,\n        in steps.\n    x: one, two: three."
+    apart = (
+        "Args:\n    row: the place,\n        in steps.\n    col: the place,\n        in steps.\n"
+        "    x: one, two: three."
+    )
+    assert docstring_names.taken_apart(text) == apart

@@ -203,7 +203,7 @@ def test_the_command_takes_the_recordings_calibration(tmp_path: Path) -> None:
     check((array.calibration, array.rho))
     given = {"fx_px": 50.0, "fy_px": 50.0, "cx_px": 48.0, "cy_px": 32.0, "baseline_m": 0.5}
     (tmp_path / "c.json").write_text(json.dumps(given))
-    succeeds("encode", source, out, *options, "--calibration", tmp_path / "c.json")
+    succeeds("encode", source, out, "-y", *options, "--calibration", tmp_path / "c.json")
     with McapReader.open(out) as reader:
         assert reader.header.array.calibration == Calibration(50.0, 50.0, 48.0, 32.0, 0.5)
 

@@ -170,7 +170,7 @@ def test_the_command_says_how_many_are_incomplete(tmp_path: Path) -> None:
         f"{target}: 6 frame sets recovered, 6 of them incomplete\n",
     )
     assert all(line.startswith("mvcodec: warning: ") for line in done.stderr.splitlines())
-    line = fails(1, "recover", source, target, "--incomplete", "drop")
+    line = fails(1, "recover", source, target, "-y", "--incomplete", "drop")
     assert "found no complete frame set that can be decoded" in line
     with pytest.raises(SettingError, match="incomplete: found some, expected keep or drop"):
         recover(source, target, lambda _: None, incomplete="some")  # type: ignore[arg-type]

@@ -204,15 +204,40 @@ def test_bad_path_files_name_what_is_wrong(tmp_path: Path, text: str, message: s
 # Styles
 
 
-def settings(grid_of_views: tuple[int, int] | None = None, focus_px: float | None = None) -> ShotSettings:
-    return ShotSettings(ARRAY, eye_steps=2.0, median_px=FAR_PX, grid=grid_of_views, focus_px=focus_px)
+def settings(
+    grid_of_views: tuple[int, int] | None = None,
+    focus_px: float | None = None,
+    convergence_px: float | None = None,
+) -> ShotSettings:
+    extremes_px = (FAR_PX, NEAR_PX)
+    return ShotSettings(ARRAY, 2.0, FAR_PX, extremes_px, grid_of_views, focus_px, convergence_px)
 
 
 def test_settings_follow_from_the_scene() -> None:
     found = ShotSettings.of(SCENE.decoded())
-    assert found.median_px == FAR_PX
-    # The nearest disparity that the maps can hold is 17 px for two steps.
-    assert found.eye_steps * 17 / 2 == pytest.approx(96 / 30)
+    assert found.median_px == found.screen_px == FAR_PX
+    assert found.extremes_px == (FAR_PX, NEAR_PX)
+    # What is nearest has 3 % of the width of parallax, when the median lies in the plane of the screen.
+    assert found.eye_steps * (NEAR_PX - FAR_PX) == pytest.approx(0.03 * 96)
+    nearer = ShotSettings.of(SCENE.decoded(), convergence_px=10.0)
+    assert nearer.eye_steps * (10 - FAR_PX) == pytest.approx(0.03 * 96)
+
+
+def test_a_refocused_picture_is_made_of_as_many_views_as_blur_without_ghosts() -> None:
+    shot = STYLES["mono"](settings(focus_px=FAR_PX))
+    assert shot.grid is not None
+    places = shot.places(MIDDLE)
+    # The near plane moves by 4 px a step against the far one: over 4 steps, and over 2 rows at rho 1.5.
+    assert shot.grid == (1 + 12, 1 + 16)
+    rows, cols = sorted({place.row for place in places}), sorted({place.col for place in places})
+    assert max(np.diff(cols)) * (NEAR_PX - FAR_PX) <= 1 + 1e-9
+    assert max(np.diff(rows)) * (NEAR_PX - FAR_PX) * ARRAY.rho <= 1 + 1e-9
+    # Round: the corners of the array are not looked through, the middles of its sides are.
+    assert Viewpoint(0, 0) not in places
+    assert {Viewpoint(0, 2), Viewpoint(1, 0), Viewpoint(1, 4), Viewpoint(2, 2)} <= set(places)
+    wide = STYLES["mono"](settings(focus_px=90))
+    assert len(wide.places(MIDDLE)) <= 1024
+    assert len(STYLES["mono"](settings((5, 5), focus_px=FAR_PX)).places(MIDDLE)) == 25
 
 
 def test_pictures_come_in_the_order_of_their_moments() -> None:
@@ -224,12 +249,13 @@ def test_pictures_come_in_the_order_of_their_moments() -> None:
         np.testing.assert_array_equal(picture, decoded.pictures[0, int(place.col)])
 
 
-def test_a_pair_of_eyes_in_focus_shows_the_plane_once() -> None:
+def test_a_pair_of_eyes_shows_the_plane_of_the_screen_once() -> None:
     decoded = SCENE.decoded()
-    (pair,) = take(STYLES["side-by-side"](settings()), [(decoded, Viewpoint(0, 1))], Linear())
+    parallel = STYLES["side-by-side"](settings(convergence_px=0))
+    (pair,) = take(parallel, [(decoded, Viewpoint(0, 1))], Linear())
     np.testing.assert_array_equal(pair, np.hstack([decoded.pictures[0, 0], decoded.pictures[0, 2]]))
-    focused = STYLES["side-by-side"](settings(focus_px=FAR_PX))
-    (pair,) = take(focused, [(decoded, Viewpoint(0, 1))], Linear())
+    converged = STYLES["side-by-side"](settings())  # at the median, which is the far plane's
+    (pair,) = take(converged, [(decoded, Viewpoint(0, 1))], Linear())
     np.testing.assert_array_equal(pair[:, 4:12], pair[:, 96 + 4 : 96 + 12])
 
 
@@ -261,7 +287,7 @@ def test_styles_refuse_grids_that_mean_nothing_to_them() -> None:
         STYLES["epipolar"](settings((2, 3)))
     with pytest.raises(SettingError, match="1024 views"):
         settings((33, 32))
-    column = ShotSettings(grid(3, 1, 8, 8), 0.0, 1.0)
+    column = ShotSettings(grid(3, 1, 8, 8), 0.0, 1.0, (1.0, 1.0))
     for style in ("side-by-side", "anaglyph", "quilt"):
         with pytest.raises(SettingError, match="one column"):
             STYLES[style](column)

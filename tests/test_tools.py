@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from small_arrays import write_array
+from small_arrays import HEIGHT, WIDTH, write_array
 
 from mvcodec.capture.picture_files import read_picture
+from mvcodec.cli.main import command_parser
 from mvcodec.container import read_info
 
 ROOT = Path(__file__).parents[1]
@@ -46,6 +48,13 @@ def test_demo_leaves_file_pictures_and_table(array: Path, tmp_path: Path) -> Non
     for name in ("contact_sheet.png", "original_synthesised_error.png"):
         assert read_picture(out / name).any()
     assert (out / "mosaic.mp4").stat().st_size > 0
+    assert read_picture(out / "first_view.png").shape == (HEIGHT, WIDTH, 3)
+    assert done.stdout.index("first_view.png") < done.stdout.index("synthesising")
+    for line, name in zip(done.stdout.splitlines()[-2:], ("play", "render"), strict=True):
+        program, command, *rest = shlex.split(line)
+        assert (ROOT / program).is_file()
+        assert command == name
+        command_parser(name).parse_args(rest)
     assert copy.read_bytes() == (out / "original_synthesised_error.png").read_bytes()
 
 

@@ -29,15 +29,19 @@ def commands_text() -> str:
     return "\n\n".join(command_text(name, command_parser(name)) for name in COMMANDS)
 
 
-def command_text(name: str, parser: argparse.ArgumentParser) -> str:
-    """The section of one command."""
+def command_text(name: str, parser: argparse.ArgumentParser, heading: str = "##") -> str:
+    """The section of one command, with one for each command below it, if there are."""
     parser.formatter_class = partial(argparse.HelpFormatter, width=USAGE_WIDTH)
-    lines = [f"## mvcodec {name}", "", _sentence(COMMANDS[name]), "", "```text"]
+    lines = [f"{heading} mvcodec {name}", "", _sentence(parser.description or ""), "", "```text"]
     lines += [parser.format_usage().removeprefix("usage: ").rstrip(), "```", ""]
-    lines += ["| argument | meaning |", "|---|---|"]
-    for action in parser._actions:
-        if action.dest != "help":
-            lines.append(f"| {_names(action)} | {_help(action, parser)} |")
+    below = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    rows = [action for action in parser._actions if action.dest != "help" and action not in below]
+    if rows:
+        lines += ["| argument | meaning |", "|---|---|"]
+        lines += [f"| {_names(action)} | {_help(action, parser)} |" for action in rows]
+    for action in below:
+        for word, inner in action.choices.items():
+            lines += ["", command_text(f"{name} {word}", inner, f"{heading}#")]
     return "\n".join(lines)
 
 

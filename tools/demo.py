@@ -2,9 +2,10 @@
 
     python tools/demo.py [--input FOLDER] [--out demo] [--qp 27] [--picture FILE.png]
 
-Renders the sample scene (or takes an array folder), encodes the corner cameras and their disparity, decodes,
-synthesises every view, measures each against its original, and codes the full array as simulcast H.264 at the
-same QP for comparison. Leaves in OUT: array.mcap, mosaic.mp4, contact_sheet.png, and one virtual view as
+Begins with one synthesised view, first_view.png, of the ready sample (or of FOLDER's first frame set). Then
+renders the sample scene (or takes FOLDER), encodes the corner cameras and their disparity, decodes,
+synthesises every view, measures each against its original, and codes the full array as simulcast H.264 at
+the same QP for comparison. Leaves in OUT: array.mcap, mosaic.mp4, contact_sheet.png, and one virtual view as
 original_synthesised_error.png.
 """
 
@@ -12,18 +13,20 @@ from __future__ import annotations
 
 import argparse
 import math
+import shlex
 import sys
 import warnings
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import mvcodec
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture import ArraySource, open_input
-from mvcodec.cli.main import main as mvcodec
+from mvcodec.cli.main import main as run_command
 from mvcodec.cli.progress import progress
 from mvcodec.container import StreamInfo, read_info
 from mvcodec.decoding.decoder import Decoder
@@ -37,12 +40,16 @@ from mvcodec.output.mosaic import contact_sheet, error_picture, mosaic
 from mvcodec.output.pictures import write_png
 from mvcodec.output.scene_folder import write_sample
 from mvcodec.output.video_file import Mp4Writer
-from mvcodec.scenes.scene import DEFAULT_SCENE, make_scene
+from mvcodec.scenes.scene import SceneSettings
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codec import RateControl
 
 THREADS = 2
+FRAMES = 8
+"""Of the sample scene: a third of a second, so that the whole takes less than two minutes on two cores."""
+
+READY = Path(__file__).resolve().parents[1] / "samples" / "room_2x2.mcap"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,11 +88,13 @@ def run(arguments: argparse.Namespace) -> int:
     """The steps; the same commands as a user would type, where there is one."""
     out: Path = arguments.out
     out.mkdir(parents=True, exist_ok=True)
+    coded = out / "array.mcap"
+    if code := first_look(arguments.input, coded, out / "first_view.png", arguments.synthesizer):
+        return code
     folder = arguments.input or out / "original"
     if arguments.input is None:
         render_sample(folder)
-    coded = out / "array.mcap"
-    if code := command("encode", folder, coded, "--qp", arguments.qp):
+    if code := command("encode", folder, coded, "--qp", arguments.qp, "-y"):
         return code
     source, info = open_input([folder]), read_info(coded)
     synthesizer = make_synthesizer(arguments.synthesizer)
@@ -96,21 +105,50 @@ def run(arguments: argparse.Namespace) -> int:
     anchor = code_anchor(source, arguments.qp)
     print(table(info, quality, anchor, arguments.qp))
     print("\nIn " + str(out) + ": " + ", ".join(sorted(path.name for path in out.iterdir())))
+    print("\nNext, look around in it, and make a film of a moving viewpoint:\n")
+    for next_command in next_commands(out, coded):
+        print("   ", next_command)
     return 0
+
+
+def first_look(folder: Path | None, coded: Path, picture: Path, synthesizer: str) -> int:
+    """One view from between the cameras, before everything that takes longer; returns an exit code."""
+    print("compiling, if this is the first time, and synthesising a first view", flush=True)
+    file = READY
+    if folder is not None:
+        file = coded
+        if code := command("encode", folder, coded, "--frames", ":1", "-y"):
+            return code
+    with mvcodec.open(file, synthesizer=synthesizer) as video:
+        array = video.array
+        # A quarter of the way, so that it is no camera's own place where there are three in a row.
+        write_png(picture, video.render((array.rows - 1) / 4, (array.cols - 1) / 4, frame=0))
+    print(f"a view that no camera saw: {picture}", flush=True)
+    return 0
+
+
+def next_commands(out: Path, coded: Path) -> tuple[str, str]:
+    """What to type next, with the path of the command that is installed beside this Python."""
+    program = Path(sys.executable).with_name("mvcodec")
+    with suppress(ValueError):
+        program = program.relative_to(Path.cwd())
+    render = [program, "render", coded, out / "round.mp4", "--path", "circle", "-y"]
+    return tuple(shlex.join(map(str, words)) for words in ([program, "play", coded], render))  # type: ignore[return-value]
 
 
 def render_sample(folder: Path) -> None:
     """What ``mvcodec sample`` does, but without the exact disparity, which nothing here looks at."""
     print(f"rendering the sample scene into {folder}", flush=True)
-    with progress("render", make_scene(DEFAULT_SCENE).frame_count) as bar:
-        write_sample(folder, progress=lambda _done, _of: bar.update(), with_truth=False)
+    settings = SceneSettings(frames=FRAMES)
+    with progress("render", FRAMES) as bar:
+        write_sample(folder, settings=settings, progress=lambda _done, _of: bar.update(), with_truth=False)
 
 
 def command(*arguments: object) -> int:
     """Run a command of the command line, and show it."""
     words = [str(argument) for argument in arguments]
     print("$ mvcodec", " ".join(words), flush=True)
-    return mvcodec(words)
+    return run_command(words)
 
 
 def decode_and_measure(

@@ -1,8 +1,8 @@
-"""Write README's tables of figures from measurements: between its two marks, nothing by hand.
+"""Write a document's tables of figures from measurements: between its two marks, nothing by hand.
 
 python tools/benchmark.py --data ../shared/data --what quality --json > quality.json
 mvcodec evaluate ../shared/data/SET --output REPORT ...
-python tools/readme_figures.py README.md --quality quality.json --reports REPORT/report.json ...
+python tools/readme_figures.py docs/quality.md --quality quality.json --reports REPORT/report.json ...
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from typing import Any
 from mvcodec.errors import InputError, MvCodecError
 from mvcodec.output.atomic import write_bytes
 
-BEGIN, END = "<!-- figures -->", "<!-- end of figures -->"
+MARKS = "<!-- figures -->", "<!-- end of figures -->"
 
 
 def main() -> int:
     """Parse, read, write."""
-    parser = argparse.ArgumentParser(description="README's tables of figures, from measurements.")
-    parser.add_argument("readme", type=Path, metavar="README.md")
+    parser = argparse.ArgumentParser(description="A document's tables of figures, from measurements.")
+    parser.add_argument("document", type=Path, metavar="DOCUMENT")
     parser.add_argument(
         "--quality", type=Path, required=True, metavar="FILE.json", help="of tools/benchmark.py"
     )
@@ -32,30 +32,30 @@ def main() -> int:
     )
     arguments = parser.parse_args()
     try:
-        text = arguments.readme.read_text(encoding="utf-8")
+        text = arguments.document.read_text(encoding="utf-8")
         tables = [
             quality_table(_read(arguments.quality)),
             rate_table([_read(path) for path in arguments.reports]),
         ]
-        write_bytes(arguments.readme, replaced(text, tables, arguments.readme).encode())
+        write_bytes(arguments.document, replaced(text, tables, arguments.document).encode())
     except (MvCodecError, OSError) as error:
         print(f"readme_figures: {error}", file=sys.stderr)
         return 1
     return 0
 
 
-def replaced(text: str, tables: Sequence[str], source: Path) -> str:
+def replaced(text: str, tables: Sequence[str], source: Path, marks: tuple[str, str] = MARKS) -> str:
     """The text with the tables between the marks.
 
     Raises:
         InputError: the marks are not there, once each and in order.
     """
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
+    before, begin, rest = text.partition(marks[0])
+    _, end, after = rest.partition(marks[1])
     if not begin or not end:
-        raise InputError(source, "no place for the figures", f"a line {BEGIN} and a line {END}")
+        raise InputError(source, "no place for the figures", f"a line {marks[0]} and a line {marks[1]}")
     body = "\n\n".join(table for table in tables if table)
-    return f"{before}{BEGIN}\n\n{body}\n\n{END}{after}"
+    return f"{before}{begin}\n\n{body}\n\n{end}{after}"
 
 
 def quality_table(benchmark: Mapping[str, Any]) -> str:

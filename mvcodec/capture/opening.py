@@ -20,6 +20,11 @@ from mvcodec.capture.view_array import PictureView, ViewArray, ViewReader, check
 from mvcodec.errors import InputError, SettingError
 from mvcodec.workers import run_all
 
+EXPECTED = (
+    f'a folder with {MANIFEST_NAME}, which `mvcodec init` writes; the smallest one: {{"rows": 2, "cols": 2, '
+    '"pattern": "r{row:02d}_c{col:02d}.mp4"}'
+)
+
 
 def open_input(
     paths: Sequence[str | os.PathLike[str]] | str | os.PathLike[str],
@@ -46,6 +51,7 @@ def open_input(
             no time in common.
     """
     timing, reading = timing or Timing(), reading or Reading()
+    paths = [Path(name) for name in inputs]
     if not paths:
         raise SettingError("INPUT", "nothing", "an array folder, or video files and `grid`, RxC")
     given = [Path(path) for path in ([paths] if isinstance(paths, str | os.PathLike) else paths)]
@@ -100,9 +106,7 @@ def _find_manifest(path: Path) -> Path:
         is_empty = not any(path.iterdir())
     except OSError as error:
         raise InputError(path, error.strerror or "an unreadable folder", "an array folder") from None
-    raise InputError(
-        path, "an empty folder" if is_empty else f"no {MANIFEST_NAME}", f"a folder with {MANIFEST_NAME}"
-    )
+    raise InputError(path, "an empty folder" if is_empty else f"no {MANIFEST_NAME}", EXPECTED)
 
 
 def _folder_array(manifest: Manifest, size: tuple[int, int], fps: float, real: str) -> CameraArray:

@@ -11,7 +11,7 @@ from pathlib import Path
 from mvcodec.errors import SettingError
 from mvcodec.stream import StreamHeader
 
-NEGATIVE_VALUES = ("--disparity-range", "--frames", "--max-depth", "--refocus", "--view")
+NEGATIVE_VALUES = ("--convergence", "--disparity-range", "--frames", "--max-depth", "--refocus", "--view")
 """Options whose value may begin with a minus sign."""
 
 OPTIONS = {
@@ -37,6 +37,7 @@ OPTIONS = {
     "bits": "--bits",
     "clock": "--clock",
     "focus_px": "--refocus",
+    "convergence_px": "--convergence",
     "format": "--format",
     "fps": "--fps",
     "host": "--host",
@@ -106,6 +107,33 @@ def pair_of_sizes(text: str) -> tuple[int, int]:
     if match is None:
         raise argparse.ArgumentTypeError(f"found {text!r}, expected two positive whole numbers such as 5x3")
     return int(match[1]), int(match[2])
+
+
+COMMON_SIZES = {"480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080), "1440p": (2560, 1440)}
+COMMON_SIZES |= dict.fromkeys(("4k", "2160p"), (3840, 2160))
+
+
+def picture_size(text: str) -> tuple[int, int]:
+    """``640x360``, or a word that everyone uses, as ``1080p``: (width, height)."""
+    return COMMON_SIZES.get(text.lower()) or pair_of_sizes(text)
+
+
+CODEC_WORDS = dict.fromkeys(("h265", "h.265", "x265"), "hevc") | dict.fromkeys(
+    ("avc", "h.264", "x264"), "h264"
+)
+
+
+def codec_name(text: str) -> str:
+    """The name that we have for a codec."""
+    return CODEC_WORDS.get(text.lower(), text.lower())
+
+
+def bit_rate(text: str) -> float:
+    """kbit/s: ``2000``, ``2000k`` or ``2M``."""
+    match = re.fullmatch(r"(-?\d+(?:\.\d+)?)([kM]?)(?:bit/s|bps)?", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected kbit/s such as 2000, or 2M")
+    return float(match[1]) * (1000 if match[2] == "M" else 1)
 
 
 def frame_slice(text: str) -> slice:

@@ -73,7 +73,9 @@ def _forward(parser: argparse.ArgumentParser, command: str) -> None:
                 default=argparse.SUPPRESS,
                 nargs=action.nargs,
                 metavar=action.metavar or choices,
-                help=(action.help or "") % {**vars(action), "prog": f"mvcodec {command}"},
+                help=((action.help or "") % {**vars(action), "prog": f"mvcodec {command}"}).replace(
+                    "%", "%%"
+                ),
             )
 
 

@@ -9,7 +9,13 @@ from typing import Any
 
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource
-from mvcodec.cli.arguments import SPECIFICATION, disparity_qp, disparity_range, pair_of_sizes
+from mvcodec.cli.arguments import (
+    SPECIFICATION,
+    codec_name,
+    disparity_qp,
+    disparity_range,
+    pair_of_sizes,
+)
 from mvcodec.cli.paths import local_path
 from mvcodec.encoding.config import AUTO
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
@@ -47,6 +53,7 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--codec",
+        type=codec_name,
         choices=CODECS,
         default=default.codec,
         help="of pictures and maps (default: %(default)s, which viewers are sure to play)",

@@ -9,16 +9,21 @@ from functools import partial
 from pathlib import Path
 
 from mvcodec.array import Position
-from mvcodec.capture import open_input, resolve_frames
+from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.cli.arguments import add_frames, add_output_options
+from mvcodec.cli.paths import PICTURE_NAMES, add_overwrite, check_folder_target
 from mvcodec.cli.progress import progress
+from mvcodec.errors import SettingError
 from mvcodec.evaluation.comparison import common_frame_count, compare
+from mvcodec.evaluation.decoded_file import DecodedFile
 from mvcodec.evaluation.quality import Comparison
 from mvcodec.evaluation.quality_by_provenance import ProvenanceQuality
 from mvcodec.frames import Picture
 from mvcodec.output.pictures import write_png
 from mvcodec.stream import view_name
+from mvcodec.synthesis.synthesizers import DEFAULT_SYNTHESIZER, make_synthesizer
 
+SUFFIX = ".mcap"
 COLUMNS = {
     "psnr_y": ("Y-PSNR dB", 9, 2),
     "ssim": ("SSIM", 7, 4),
@@ -32,7 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``compare``."""
     parser.add_argument("original", type=Path, metavar="ORIGINAL", help="array folder")
     parser.add_argument(
-        "decoded", type=Path, metavar="DECODED", help="array folder, as decode --format array writes it"
+        "decoded",
+        type=Path,
+        metavar="DECODED",
+        help="array folder, as decode --format array writes it, or an .mcap file, which is decoded meanwhile",
     )
     add_frames(parser, "frames to compare, out of those in both folders")
     parser.add_argument(
@@ -52,12 +60,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="write each view's SSIM map of the first compared frame, as DIR/rRR_cCC.png: white is alike",
     )
+    add_overwrite(parser)
     add_output_options(parser, "print JSON")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Compare and print."""
-    original, decoded = open_input([arguments.original]), open_input([arguments.decoded])
+    if arguments.ssim_maps is not None:
+        check_folder_target(arguments.ssim_maps, rf"{PICTURE_NAMES}\.png", overwrite=arguments.overwrite)
+    original, decoded = open_input([arguments.original]), _open_decoded(arguments)
     count = common_frame_count(original, decoded)
     total = len(resolve_frames(arguments.frames, count, decoded.name))
     with progress("compare", total, quiet=arguments.quiet) as bar:
@@ -71,6 +82,16 @@ def run(arguments: argparse.Namespace) -> None:
             on_frame=bar.update,
         )
     print(json.dumps(result.to_json()) if arguments.json else table(result))
+
+
+def _open_decoded(arguments: argparse.Namespace) -> ArraySource:
+    if arguments.decoded.suffix.lower() != SUFFIX:
+        return open_input([arguments.decoded])
+    if arguments.provenance is not None:
+        raise SettingError(
+            "--provenance", f"with {arguments.decoded}", "as DECODED what decode --provenance wrote"
+        )
+    return DecodedFile(arguments.decoded, make_synthesizer(DEFAULT_SYNTHESIZER))
 
 
 def table(result: Comparison) -> str:

@@ -22,11 +22,20 @@ from mvcodec.cli.arguments import (
     pair_of_sizes,
     view,
 )
+from mvcodec.cli.info import count
 from mvcodec.cli.interrupt import deferred_interrupt
-from mvcodec.cli.paths import check_file_target, local_path
-from mvcodec.cli.progress import progress
+from mvcodec.cli.paths import (
+    ARRAY_NAMES,
+    PICTURE_NAMES,
+    VIDEO_NAMES,
+    add_overwrite,
+    check_file_target,
+    check_folder_target,
+    local_path,
+)
+from mvcodec.cli.progress import progress, tell_written
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
-from mvcodec.cli.standard_streams import STANDARD, standard_input, standard_output
+from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD, standard_input, standard_output
 from mvcodec.container import McapReader
 from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.follow import FollowedFile
@@ -45,6 +54,8 @@ from mvcodec.workers import run_all
 MOSAIC = "mosaic"
 MOSAIC_SUFFIXES = (".mp4", ".png")
 MCAP = "mcap"
+FORM_OF_ENDING = dict.fromkeys(MOSAIC_SUFFIXES, MOSAIC) | {".mcap": MCAP}
+FOLDER_NAMES = {"array": ARRAY_NAMES, "png": PICTURE_NAMES, "mp4": VIDEO_NAMES}
 FORMS_WITH_PROVENANCE = ("array", "png")
 """Those whose views are folders of pictures, which it can lie beside."""
 
@@ -61,9 +72,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "output",
         type=local_path,
         metavar="OUT",
-        help="a folder; for --format mosaic a .mp4 or .png file; for --format mcap a .mcap file or -",
+        help="a folder; or by its ending one file: .mp4 or .png, several views as a mosaic, or .mcap, each"
+        " view a topic; or - with --format mcap",
     )
-    parser.add_argument("--format", choices=(*FORMS, MCAP), help="default: array, or png with --view")
+    parser.add_argument(
+        "--format",
+        choices=(*FORMS, MCAP),
+        help="default: by OUT's ending; for a folder array, or png with --view",
+    )
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
         "--grid",
@@ -93,13 +109,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_frames(parser, "frames of the file to decode")
     add_on_error(parser, "stop")
     add_limits(parser)
+    add_overwrite(parser)
     add_output_options(parser, "print what was decoded, and how much of the input was read, as JSON")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Decode, render every view of each frame set side by side, write."""
     synthesizer = make_synthesizer(arguments.synthesizer)
-    form = arguments.format or ("png" if arguments.view else "array")
+    form = arguments.format or _form_of(arguments)
     if arguments.json and str(arguments.output) == STANDARD:
         raise SettingError("--json", "with OUT -", "another OUT: both would be standard output")
     if form == "array" and arguments.view:
@@ -136,8 +153,18 @@ def run(arguments: argparse.Namespace) -> None:
         report = {"frames": frames, "bytes_read": decoder.bytes_read, "bytes": decoder.bytes}
     if arguments.json:
         print(json.dumps(report))
+    elif not arguments.quiet and damage is None:
+        of_views = f"{count(frames, 'frame')} of {count(len(plan.viewpoints), 'view')}"
+        wrote = str(arguments.output) if str(arguments.output) != STANDARD else OUTPUT_NAME
+        tell_written(wrote, of_views, frames, plan.array.fps)
     if damage is not None:
         raise damage
+
+
+def _form_of(arguments: argparse.Namespace) -> str:
+    """The form that OUT's ending names, else that of a folder."""
+    folder = "png" if arguments.view else "array"
+    return FORM_OF_ENDING.get(arguments.output.suffix.lower(), folder)
 
 
 @contextmanager
@@ -171,12 +198,13 @@ def _check_output(form: str, arguments: argparse.Namespace) -> None:
             raise SettingError("OUT", path, f"a folder, or --format {MCAP} for standard output")
         if path.exists() and not path.is_dir():
             raise OutputError(path, f"it is a file, --format {form} needs a folder")
+        check_folder_target(path, FOLDER_NAMES[form], overwrite=arguments.overwrite)
         return
     suffixes = MOSAIC_SUFFIXES if form == MOSAIC else (".mcap",)
     if path.suffix.lower() not in suffixes and not (form == MCAP and str(path) == STANDARD):
         expected = f"a name that ends in {' or '.join(suffixes)} for --format {form}"
         raise SettingError("OUT", path, expected)
-    check_file_target(path)
+    check_file_target(path, overwrite=arguments.overwrite)
 
 
 def _open_sink(form: str, arguments: argparse.Namespace, plan: OutputPlan, outputs: ExitStack) -> Sink:

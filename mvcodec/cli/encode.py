@@ -13,7 +13,7 @@ from pathlib import Path
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.capture.manifest import read_calibration
-from mvcodec.cli.arguments import add_frames, add_output_options
+from mvcodec.cli.arguments import add_frames, add_output_options, bit_rate
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.encode_stream import (
     Unfinished,
@@ -23,10 +23,10 @@ from mvcodec.cli.encode_stream import (
     open_target,
     refuse_stream_options,
 )
-from mvcodec.cli.info import document, summary
+from mvcodec.cli.info import document, simulcast_bits, summary
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_view_option import add_live_view, live_view
-from mvcodec.cli.paths import check_file_target, local_path
+from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.picture_options import add_picture_options, reading_of
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_chunk_ms
@@ -34,7 +34,7 @@ from mvcodec.cli.segment_options import add_segment, check_continues, plan
 from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD
 from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.cli.time_options import add_time_options, timing_of
-from mvcodec.container import McapWriter, read_info
+from mvcodec.container import McapWriter, StreamInfo, read_info
 from mvcodec.depth import require_calibration
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.speed import FOR_LIVE
@@ -60,7 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     rate.add_argument("--qp", type=int, metavar="N", help=f"constant QP, 1..51, av1 and vp9 1..63 {usual}")
     rate.add_argument("--crf", type=float, metavar="N", help="constant rate factor")
     rate.add_argument(
-        "--bitrate", type=float, metavar="KBPS", help="kbit/s of the pictures and maps of all cameras"
+        "--bitrate",
+        type=bit_rate,
+        metavar="KBPS",
+        help="kbit/s of the pictures and maps of all cameras; 2M is 2000",
     )
     add_coding(parser)
     parser.add_argument(
@@ -77,12 +80,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_stream_arguments(parser)
     add_segment(parser)
     add_frames(parser, "frames of the input to code")
+    add_overwrite(parser)
     add_output_options(parser, "print what the file holds as JSON")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Encode; leaves no output where nothing was encoded, a proper one where something was."""
-    _check_output(arguments.output, arguments.input)
+    _check_output(arguments.output, arguments.input, overwrite=arguments.overwrite or arguments.dry_run)
     _check_effect(arguments)
     writer = (
         encode_stream(arguments, lambda array: _config(array, arguments))
@@ -97,9 +101,18 @@ def run(arguments: argparse.Namespace) -> None:
         return
     info = read_info(arguments.output)
     if arguments.json:
-        print(json.dumps(document(info)))
+        print(json.dumps(document(info) | {"simulcast_bits_estimated": simulcast_bits(info)}))
     elif not arguments.quiet:
-        print(f"{arguments.output}: {summary(info)}")
+        print(f"{arguments.output}: {summary(info)}{_beside_simulcast(info)}")
+
+
+def _beside_simulcast(info: StreamInfo) -> str:
+    """How the file compares with all views coded by themselves, where there are more than it codes."""
+    array = info.header.array
+    if len(array.real) == len(array.positions):
+        return ""
+    share = info.bits.total / max(simulcast_bits(info), 1)
+    return f"; about {share:.0%} of all {len(array.positions)} views as simulcast, going by the real ones"
 
 
 def _check_effect(arguments: argparse.Namespace) -> None:
@@ -177,7 +190,7 @@ def _encode(
     return writer
 
 
-def _check_output(output: Path, inputs: Sequence[Path]) -> None:
+def _check_output(output: Path, inputs: Sequence[Path], *, overwrite: bool) -> None:
     if str(output) == STANDARD:
         return
     if output.resolve() in [path.resolve() for path in inputs]:
@@ -185,7 +198,7 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
     if output.suffix.lower() != SUFFIX:
         # It would most likely be the last INPUT, with OUT forgotten.
         raise SettingError("OUT", output, f"a file name that ends in {SUFFIX}")
-    check_file_target(output)
+    check_file_target(output, overwrite=overwrite)
 
 
 def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:

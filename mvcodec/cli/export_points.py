@@ -15,7 +15,7 @@ from mvcodec.cli.arguments import (
     positive_int,
     positive_number,
 )
-from mvcodec.cli.paths import check_file_target, local_path
+from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.container.point_writer import PointWriter
@@ -52,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_frames(parser, "frames of the file to export")
     add_on_error(parser, "stop")
     add_limits(parser)
+    add_overwrite(parser)
     add_output_options(parser)
 
 
@@ -61,7 +62,7 @@ def run(arguments: argparse.Namespace) -> None:
     suffix = target.suffix.lower()
     if suffix not in SUFFIXES:
         raise SettingError("OUT", target, f"a name that ends in {' or '.join(SUFFIXES)}")
-    check_file_target(target)
+    check_file_target(target, overwrite=arguments.overwrite)
     if target.resolve() == Path(arguments.input).resolve():
         raise SettingError("OUT", target, "another file than IN.mcap")
     with (

@@ -5,13 +5,21 @@ from __future__ import annotations
 import argparse
 import json
 import warnings
+from collections.abc import Mapping
 from dataclasses import asdict
+from datetime import UTC, datetime
 from typing import Any
 
 from mvcodec.container import StreamInfo, read_info
 from mvcodec.decoding.estimated_maps import DEFAULT_MATCHER
 from mvcodec.errors import MvCodecWarning, StreamError
 from mvcodec.stream import StreamHeader, TrackKind
+
+RATES = {"qp": "QP {:g}", "crf": "CRF {:g}", "bitrate_kbps": "{:g} kbit/s asked for"}
+"""What governs the bits, in the header's settings."""
+
+FIRST_DATED_S = 315_532_800.0
+"""1980: times before it count from the beginning of something else than 1970."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,6 +40,9 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"  grid         {array.rows} x {array.cols}, {array.width} x {array.height} px, {array.fps:g} fps")
     print(f"  real         {len(array.real)} cameras: rows {rows}, cols {cols}")
     print(f"  disparity    {low:g}..{high:g} px between neighbouring real cameras, {_maps(info.header)}")
+    print(f"  codec        {info.header.codec}, {_rate(info.header.settings)}")
+    print(f"  matcher      {info.header.settings.get('matcher', 'not stated')}")
+    print(f"  made by      {info.header.settings.get('encoder', 'not stated')}{_recorded(info)}")
     if info.header.predicted:
         tracks = [info.header.picture_track(camera) for camera in array.real]
         alone = [track.topic for track in tracks if track.kind is TrackKind.TEXTURE]
@@ -48,6 +59,23 @@ def run(arguments: argparse.Namespace) -> None:
 
 def _warn(error: StreamError) -> None:
     warnings.warn(str(error), MvCodecWarning, stacklevel=3)
+
+
+def _rate(settings: Mapping[str, Any]) -> str:
+    """What governed the bits, as the options say it."""
+    for name, text in RATES.items():
+        if name in settings:
+            return text.format(settings[name])
+    return "rate not stated"
+
+
+def _recorded(info: StreamInfo) -> str:
+    """When the pictures were taken, where their times are of a clock and don't count from 0."""
+    first_s = info.span_ns[0] / 1e9
+    if first_s < FIRST_DATED_S:
+        return ""
+    moment = datetime.fromtimestamp(first_s, UTC)
+    return f", pictures from {moment:%Y-%m-%d %H:%M:%S} UTC on"
 
 
 def _maps(header: StreamHeader) -> str:
@@ -79,17 +107,35 @@ def document(info: StreamInfo) -> dict[str, Any]:
         ],
         "version": info.header.version,
         "calibration": "given" if array.calibration.given else "nominal",
+        "codec": info.header.codec,
+        "rate": {name: info.header.settings[name] for name in RATES if name in info.header.settings},
+        "matcher": info.header.settings.get("matcher"),
+        "encoder": info.header.settings.get("encoder"),
+        "first_s": info.span_ns[0] / 1e9,
+        "duration_s": info.duration_s,
+        "megabytes": info.bits.total / 8e6,
+        "mbit_per_s": _mbit_per_s(info),
     }
 
 
 def summary(info: StreamInfo) -> str:
     """One line: frame sets, bits, rate."""
-    array, bits = info.header.array, info.bits.total
-    rate = bits * array.fps / max(info.frames, 1)
+    array, bits = info.header.array, info.bits
+    tracks = max(bits.total, bits.texture + bits.disparity, 1)
     return (
-        f"{count(info.frames, 'frame set')} of {count(len(array.real), 'camera')}, {bits / 1000:.1f} kbit"
-        f" ({rate / 1000:.1f} kbit/s; maps {info.bits.disparity / bits:.0%})"
+        f"{count(info.frames, 'frame set')} of {count(len(array.real), 'camera')}, {info.duration_s:.2f} s,"
+        f" {bits.total / 8e6:.3f} MB ({_mbit_per_s(info):.3f} Mbit/s; maps {bits.disparity / tracks:.0%})"
     )
+
+
+def _mbit_per_s(info: StreamInfo) -> float:
+    return info.bits.total / 1e6 / info.duration_s if info.frames else 0.0
+
+
+def simulcast_bits(info: StreamInfo) -> int:
+    """About what all views of the grid take, each coded by itself: as much a view as the real ones."""
+    array = info.header.array
+    return round(info.bits.texture * len(array.positions) / len(array.real))
 
 
 def count(number: int, what: str) -> str:

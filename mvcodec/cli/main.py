@@ -14,11 +14,13 @@ import mvcodec
 from mvcodec.cli.arguments import as_option, in_options, join_negative_values, names_as_paths
 from mvcodec.cli.standard_streams import ReaderGone, checked_streams
 from mvcodec.cli.warning_lines import WarningLines
+from mvcodec.cli.wording import in_our_words, with_suggestion
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
 from mvcodec.workers import THREADS_HELP, set_threads
 
 COMMANDS: dict[str, str] = {
     "sample": "render the sample scene as an array folder",
+    "init": "write the array.json of a folder of pictures or videos",
     "rectify": "make a rectified array of what ordinary cameras see",
     "encode": "code an array of pictures or videos into one MCAP file",
     "decode": "decode a file and synthesise views from it",
@@ -45,11 +47,20 @@ EXIT_USAGE = 2
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """An argument parser that says what is wrong in one line."""
+    """An argument parser that says what is wrong in one line.
+
+    Attributes:
+        chosen: the parser of the command that is meant, if one is.
+    """
+
+    chosen: argparse.ArgumentParser | None = None
 
     def error(self, message: str) -> NoReturn:
         """Print one line and leave with exit code 2."""
-        self.exit(EXIT_USAGE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        meant = self.chosen or self
+        known = [option for action in meant._actions for option in action.option_strings]
+        text = _one_line(in_our_words(message, known))
+        self.exit(EXIT_USAGE, f"mvcodec: error: {text} (see {meant.prog} --help)\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -84,7 +95,7 @@ def _run(arguments: Sequence[str]) -> int:
         _use_threads(getattr(parsed, "threads", None))
         _module(parsed.command).run(parsed)
     except SettingError as error:
-        return _fail(as_option(error), EXIT_USAGE)
+        return _fail(with_suggestion(as_option(error)), EXIT_USAGE)
     except ReaderGone:
         return EXIT_FAILURE
     except (MvCodecError, OSError) as error:
@@ -112,6 +123,7 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
         # The options name the choices of the plug-in tables, whose import takes time: ask only the
         # command that is meant.
         if name in arguments:
+            parser.chosen = command
             _add_arguments(name, command)
     return parser
 

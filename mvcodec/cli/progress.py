@@ -7,6 +7,11 @@ import sys
 from tqdm import tqdm
 
 
+def tell_written(target: object, what: str, pictures: int, fps: float) -> None:
+    """Say on standard error what was written: where, how much, and how long it plays."""
+    print(f"mvcodec: {target}: {what}, {fps:g} fps, {pictures / fps:.2f} s", file=sys.stderr)
+
+
 def progress(description: str, total: int | None, *, quiet: bool = False, unit: str = "frame") -> tqdm[None]:
     """A bar to be used as a context manager and moved on with `update`.
 

@@ -6,7 +6,7 @@ import argparse
 import warnings
 
 from mvcodec.cli.info import count
-from mvcodec.cli.paths import check_file_target, local_path
+from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.safety import add_limits
 from mvcodec.conformance.recovery import recover
 from mvcodec.container.limits import Limits
@@ -25,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " that is complete (default: %(default)s)",
     )
     add_limits(parser)
+    add_overwrite(parser)
     parser.add_argument("--quiet", action="store_true", help="no summary")
 
 
@@ -32,7 +33,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Copy what is whole; say what is not."""
     if arguments.output.resolve() == arguments.input.resolve():
         raise SettingError("OUT", arguments.output, "another file than IN.mcap")
-    check_file_target(arguments.output)
+    check_file_target(arguments.output, overwrite=arguments.overwrite)
     limits = Limits(**dict(arguments.limit))
     result = recover(arguments.input, arguments.output, _warn, limits, arguments.incomplete)
     if not arguments.quiet:

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 from pathlib import Path
 
 from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes
-from mvcodec.cli.paths import local_path
+from mvcodec.cli.paths import (
+    ARRAY_NAMES,
+    add_overwrite,
+    check_file_target,
+    check_folder_target,
+    local_path,
+)
 from mvcodec.cli.progress import progress
 from mvcodec.errors import SettingError
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
@@ -57,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="between pixels (default: %(default)s)",
     )
     add_frames(parser, "frames of the input to use")
+    add_overwrite(parser)
     add_output_options(parser, "print the rig as JSON")
 
 
@@ -65,6 +73,11 @@ def run(arguments: argparse.Namespace) -> None:
     output: Path = arguments.output
     if output.resolve() in [path.resolve() for path in arguments.input]:
         raise SettingError("OUT", output, "another place than INPUT")
+    if output.suffix.lower() == ".json":
+        check_file_target(output, overwrite=arguments.overwrite)
+    else:
+        names = rf"{re.escape(RIG_NAME)}|{ARRAY_NAMES}"
+        check_folder_target(output, names, overwrite=arguments.overwrite)
     source = open_input(arguments.input, grid=arguments.grid, real="all")
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     found = calibrate(source, chosen, crop=arguments.crop, size=arguments.size)

@@ -21,8 +21,9 @@ from mvcodec.cli.arguments import (
     pair_of_sizes,
     view,
 )
-from mvcodec.cli.paths import check_file_target, local_path
-from mvcodec.cli.progress import progress
+from mvcodec.cli.info import count as counted
+from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
+from mvcodec.cli.progress import progress, tell_written
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.container import McapReader
 from mvcodec.container.limits import Limits
@@ -67,8 +68,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--refocus",
         type=_pixels,
         metavar="PX",
-        help="disparity in focus, px for one step of the input's grid: the others blur; "
-        "with another style than mono it comes to lie in the plane of the screen",
+        help="disparity in focus, px for one step of the input's grid: the others blur, as through a lens as"
+        " large as the array",
+    )
+    parser.add_argument(
+        "--convergence",
+        type=_pixels,
+        metavar="PX",
+        help="disparity in the plane of the screen, px for one step, for pictures of several views"
+        " (default: the scene's median; eyes stand so that nothing is farther than 3%% of the width from it)",
     )
     parser.add_argument(
         "--grid",
@@ -81,6 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_frames(parser, "frames of the file")
     add_on_error(parser, "stop")
     add_limits(parser)
+    add_overwrite(parser)
     add_output_options(parser)
 
 
@@ -100,29 +109,42 @@ def run(arguments: argparse.Namespace) -> None:
         first = next(sets, None)
         if first is None:
             raise StreamError(arguments.input, "no frame set", "one at least")
-        shot = STYLES[arguments.style](ShotSettings.of(first, arguments.grid, arguments.refocus))
+        shot = STYLES[arguments.style](_settings(first, arguments))
         if arguments.path is not None and not shot.moves:
             raise SettingError("--path", arguments.path, "none for a picture of the whole array")
         output = arguments.output
         if arguments.style == QUILT and shot.grid is not None:
             output = quilt_path(output, *shot.grid, array.width / array.height)
+            check_file_target(output, overwrite=arguments.overwrite)
         times = repeat(first) if count == 1 else chain([first], sets)
         stamps: deque[int] = deque()
         moments = _stamped(zip(places, times, strict=False), stamps)
         with progress("render", len(places), quiet=arguments.quiet, unit="picture") as bar:
-            pictures = _counted(take(shot, moments, synthesizer), bar)
+            made = _Counted(take(shot, moments, synthesizer), bar)
+            pictures = iter(made)
             timed = ((picture, stamps.popleft()) for picture in pictures)
             write(output, at_rate(pictures, array.fps) if count == 1 else timed, array.fps)
-    if output != arguments.output and not arguments.quiet:
-        print(output)
+    if not arguments.quiet:
+        tell_written(output, counted(made.count, "picture"), made.count, array.fps)
+        if output != arguments.output:
+            print(output)
+
+
+def _settings(first: DecodedSet, arguments: argparse.Namespace) -> ShotSettings:
+    return ShotSettings.of(first, arguments.grid, arguments.refocus, arguments.convergence)
 
 
 def _check_settings(arguments: argparse.Namespace) -> None:
     """Refuse what cannot be done before any work is."""
+    if arguments.refocus is not None and arguments.style != "mono":
+        expected = "--style mono; --convergence says what lies in the plane of the screen"
+        raise SettingError("--refocus", f"with --style {arguments.style}", expected)
+    if arguments.convergence is not None and arguments.style == "mono":
+        raise SettingError("--convergence", "with --style mono", "a style of several views")
     output = arguments.output
     if Path(arguments.input).resolve() == output.resolve():
         raise SettingError("OUT", output, "another file than FILE.mcap")
-    check_file_target(output)
+    check_file_target(output, overwrite=arguments.overwrite)
     if arguments.path is not None and output.suffix.lower() == STILL_SUFFIX:
         raise SettingError("--path", arguments.path, f"none for {output.name}, which holds one picture")
 
@@ -163,10 +185,18 @@ def _stamped(
         yield decoded, place
 
 
-def _counted(pictures: Iterator[Picture], bar: tqdm[None]) -> Iterator[Picture]:
-    for picture in pictures:
-        yield picture
-        bar.update()
+class _Counted:
+    """Pictures, and how many there were."""
+
+    def __init__(self, pictures: Iterator[Picture], bar: tqdm[None]) -> None:
+        self._pictures, self._bar = pictures, bar
+        self.count = 0
+
+    def __iter__(self) -> Iterator[Picture]:
+        for picture in self._pictures:
+            self.count += 1
+            yield picture
+            self._bar.update()
 
 
 def _pixels(text: str) -> float:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from mvcodec.cli.arguments import add_output_options, pair_of_sizes, positive_int
+from mvcodec.cli.arguments import add_output_options, pair_of_sizes, picture_size, positive_int
 from mvcodec.cli.info import count
-from mvcodec.cli.paths import local_path
+from mvcodec.cli.paths import ARRAY_NAMES, add_overwrite, check_folder_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.output.scene_folder import make_sample, write_sample
 from mvcodec.scenes.rough_rig import FLAWS, RoughRigSettings
@@ -15,9 +15,7 @@ from mvcodec.scenes.scene import DEFAULT_SCENE, SCENES, SceneSettings
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``sample``."""
-    parser.add_argument(
-        "output", type=local_path, metavar="OUTDIR", help="a folder; an existing one is written into"
-    )
+    parser.add_argument("output", type=local_path, metavar="OUTDIR", help="the array folder to write")
     parser.add_argument(
         "--scene",
         default=DEFAULT_SCENE,
@@ -29,7 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--frames", type=positive_int, metavar="N", help="how many (default: 24)")
     parser.add_argument(
-        "--size", type=pair_of_sizes, metavar="WxH", help="of the pictures, px (default: 640x360)"
+        "--size",
+        type=picture_size,
+        metavar="WxH",
+        help="of the pictures, px, or a word as 720p (default: 640x360)",
     )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="varies the scene (default: %(default)s)"
@@ -40,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="seen by imperfect cameras, with their exact truth in rig_truth.json; flaws:"
         f" {', '.join(FLAWS)} (default: all of them)",
     )
+    add_overwrite(parser)
     add_output_options(parser)
 
 
@@ -48,6 +50,7 @@ def run(arguments: argparse.Namespace) -> None:
     settings = SceneSettings(arguments.grid, arguments.frames, arguments.size, arguments.seed)
     rig = None if arguments.rig is None else RoughRigSettings.from_text(arguments.rig)
     frames = make_sample(arguments.scene, settings, rig).frame_count
+    check_folder_target(arguments.output, ARRAY_NAMES, overwrite=arguments.overwrite)
     with progress("render", frames, quiet=arguments.quiet) as bar:
         scene = write_sample(
             arguments.output, arguments.scene, settings, lambda _done, _of: bar.update(), rig=rig

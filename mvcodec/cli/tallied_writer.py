@@ -20,12 +20,14 @@ class TalliedWriter(McapWriter):
         self._output = target
         self._header: StreamHeader | None = None
         self._bytes: Counter[TrackKind] = Counter()
+        self._times_ns: list[int] = []
 
     def push(self, packets: Sequence[Packet]) -> None:
         """Write one frame set's packets and count them."""
         super().push(packets)
         if self._header is None:
             self._header = StreamHeader.from_json(packets[0].data)
+        self._times_ns = [*self._times_ns[:1], packets[0].time_ns]
         for packet in packets:
             self._bytes[packet.track.kind] += len(packet.data)
 
@@ -35,6 +37,7 @@ class TalliedWriter(McapWriter):
         total = 8 * self._output.written
         texture = 8 * (self._bytes[TrackKind.TEXTURE] + self._bytes[TrackKind.PREDICTED])
         disparity = 8 * self._bytes[TrackKind.DISPARITY]
+        bits = Bits.of(total, texture, disparity)
         return StreamInfo(
-            self._header, self.frame_count, Bits(total, texture, disparity, total - texture - disparity)
+            self._header, self.frame_count, bits, span_ns=(self._times_ns[0], self._times_ns[-1])
         )

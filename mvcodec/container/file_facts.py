@@ -20,13 +20,19 @@ class Bits:
         total: the whole file.
         texture: access units of the pictures.
         disparity: access units of the maps.
-        other: the rest: container, headers, calibration.
+        other: the rest: container, headers, calibration, depth. 0 where the container's compression
+            saves more than that takes.
     """
 
     total: int
     texture: int
     disparity: int
     other: int
+
+    @classmethod
+    def of(cls, total: int, texture: int, disparity: int) -> Bits:
+        """The sizes, the rest worked out."""
+        return cls(total, texture, disparity, max(0, total - texture - disparity))
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +43,7 @@ class StreamInfo:
         frames: frame sets, those that can be read.
         dropped: frame sets that a live encoder left out; None where the file says nothing of it.
         damages: in how many places the file is damaged; what is there was not counted.
+        span_ns: times of the first and the last frame set; (0, 0) where there is none.
     """
 
     header: StreamHeader
@@ -44,6 +51,13 @@ class StreamInfo:
     bits: Bits
     dropped: int | None = None
     damages: int = 0
+    span_ns: tuple[int, int] = (0, 0)
+
+    @property
+    def duration_s(self) -> float:
+        """How long it plays: to the last frame set's end."""
+        first, last = self.span_ns
+        return (last - first) / 1e9 + 1 / self.header.array.fps if self.frames else 0.0
 
 
 def read_info(source: str | Path | BinaryIO, on_damage: OnDamage | None = None) -> StreamInfo:
@@ -64,13 +78,17 @@ def read_info(source: str | Path | BinaryIO, on_damage: OnDamage | None = None) 
 
     sizes = dict.fromkeys(TrackKind, 0)
     frames, last = 0, -1
+    times: list[int] = []
     with McapReader.open(source, on_damage=None if on_damage is None else note) as reader:
         for number, packet in reader.packets():
             sizes[packet.track.kind] += 8 * len(packet.data)
-            frames, last = frames + (number != last), number
+            if number != last:
+                frames, last = frames + 1, number
+                times = [*times[:1], packet.time_ns]
         dropped = reader.dropped
         total = 8 * reader.size
     texture = sizes[TrackKind.TEXTURE] + sizes[TrackKind.PREDICTED]
     disparity = sizes[TrackKind.DISPARITY]
-    bits = Bits(total, texture, disparity, total - texture - disparity)
-    return StreamInfo(reader.header, frames, bits, dropped, len(damages))
+    bits = Bits.of(total, texture, disparity)
+    span = (times[0], times[-1]) if times else (0, 0)
+    return StreamInfo(reader.header, frames, bits, dropped, len(damages), span)

@@ -64,8 +64,8 @@ def encode(
         SettingError: a setting is unknown or outside its range, or does not fit the array.
         OutputError: the system refuses to write.
 
-        Whatever is raised, by the iterable too, the frame sets before it are in the file, which is a proper
-        one; where there are none, there is no file.
+    Whatever is raised, by the iterable too, the frame sets before it are in the file, which is a proper
+    one; where there are none, there is no file.
     """
     path = Path(output)
     if path.suffix.lower() != SUFFIX:

@@ -12,19 +12,19 @@ from mvcodec.evaluation.document import every_warning
 
 STYLE = """
 :root { --ink: #1a1a1a; --soft: #5c5c5c; --line: #dcdcdc; --ours: #D55E00; }
-body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: #fff; max-width: 64rem;
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: #fff; max-width: 110rem;
   margin: 2rem auto; padding: 0 1.2rem; }
 h1 { font-size: 1.5rem; margin: 0 0 .2rem; } h2 { font-size: 1.1rem; margin: 2.2rem 0 .4rem; }
-p { margin: .4rem 0; } .soft { color: var(--soft); }
+p, ul { max-width: 64rem; } p { margin: .4rem 0; } .soft { color: var(--soft); }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
 th, td { padding: .22rem .7rem; text-align: right; border-bottom: 1px solid var(--line);
   white-space: nowrap; }
-th { font-weight: 600; vertical-align: bottom; }
+th { font-weight: 600; vertical-align: bottom; white-space: normal; }
 th:first-child, td:first-child { text-align: left; padding-left: 0; }
 tr.ours td { font-weight: 600; } tr.ours td:first-child { color: var(--ours); }
 tr.first td { border-top: 2px solid var(--line); }
-figure { margin: .6rem 0; } figure img { max-width: 100%; height: auto; }
+figure { margin: .6rem 0; } figure img { max-width: min(100%, 64rem); height: auto; }
 figcaption { color: var(--soft); font-size: .9rem; max-width: 48rem; }
 ul { padding-left: 1.2rem; margin: .4rem 0; }
 .warning { border-left: 4px solid #E69F00; padding: .3rem .9rem; }

@@ -5,6 +5,7 @@ Each style makes a `Shot`; `take` renders the views that it needs.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -30,11 +31,14 @@ QUILT_GRID = (6, 8)
 """Rows and columns, as most of the displays take them."""
 
 SLICE_VIEWS = 96
-APERTURE_SIDE = 5
-"""Fewer views on a side show as ghosts in a refocused picture."""
+APERTURE_SHIFT_PX = 1.0
+"""Between neighbouring views of a refocused picture: more shows as ghosts of what is out of focus."""
 
-STEREO_SHARE = 1 / 30
-"""Of the picture's width: the largest disparity between two eyes by default, a rule of thumb."""
+STEREO_SHARE = 0.03
+"""Of the picture's width: the largest parallax, either way of the plane of the screen, by default."""
+
+EXTREMES = (1, 99)
+"""Per cent of the pixels that are farther than what counts as the farthest, and the nearest."""
 
 Grid = tuple[int, int]
 
@@ -47,33 +51,51 @@ class ShotSettings:
         array: of the file.
         eye_steps: distance of two eyes in steps of its grid.
         median_px: a disparity in the middle of the scene, px for one step.
+        extremes_px: those of what is far and near, px for one step.
         grid: (rows, cols) of views, or None for the style's own.
         focus_px: the disparity in focus, px for one step, or None.
+        convergence_px: the disparity in the plane of the screen, px for one step; None: the middle one.
     """
 
     array: CameraArray
     eye_steps: float
     median_px: float
+    extremes_px: tuple[float, float]
     grid: Grid | None = None
     focus_px: float | None = None
+    convergence_px: float | None = None
 
     def __post_init__(self) -> None:
         if self.grid is not None and self.grid[0] * self.grid[1] > MAX_VIEWS:
             raise SettingError(
                 "grid", f"{self.grid[0]}x{self.grid[1]}", f"{MAX_VIEWS} views in one picture at most"
             )
-        if self.focus_px is not None and not abs(self.focus_px) <= self.array.width:
-            expected = f"at most {self.array.width} px, a picture's width, either way"
-            raise SettingError("focus_px", f"{self.focus_px:g}", expected)
+        for option, px in (("focus_px", self.focus_px), ("convergence_px", self.convergence_px)):
+            if px is not None and not abs(px) <= self.array.width:
+                expected = f"at most {self.array.width} px, a picture's width, either way"
+                raise SettingError(option, f"{px:g}", expected)
+
+    @property
+    def screen_px(self) -> float:
+        """The disparity in the plane of the screen, px for one step."""
+        return self.median_px if self.convergence_px is None else self.convergence_px
 
     @classmethod
-    def of(cls, decoded: DecodedSet, grid: Grid | None = None, focus_px: float | None = None) -> ShotSettings:
-        """The settings that suit a scene."""
+    def of(
+        cls,
+        decoded: DecodedSet,
+        grid: Grid | None = None,
+        focus_px: float | None = None,
+        convergence_px: float | None = None,
+    ) -> ShotSettings:
+        """The settings that suit a scene: two eyes are as far apart as its depth allows."""
         array = decoded.array
-        largest = max(map(abs, decoded.disparity_range_px)) / array.baseline_steps
-        eyes = min(array.cols - 1, STEREO_SHARE * array.width / largest) if largest else 0.0
-        maps = [disparity.values_px for disparity in decoded.disparities.values()]
-        return cls(array, eyes, float(np.median(np.stack(maps))) / array.baseline_steps, grid, focus_px)
+        maps = np.stack([disparity.values_px for disparity in decoded.disparities.values()])
+        far, median, near = np.percentile(maps, [EXTREMES[0], 50, EXTREMES[1]]) / array.baseline_steps
+        settings = cls(array, 0.0, float(median), (float(far), float(near)), grid, focus_px, convergence_px)
+        depth = max(abs(px - settings.screen_px) for px in settings.extremes_px)
+        eyes = min(array.cols - 1.0, STEREO_SHARE * array.width / depth) if depth else array.cols - 1.0
+        return replace(settings, eye_steps=eyes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +124,32 @@ def _mono(settings: ShotSettings) -> Shot:
 
 def _refocused(settings: ShotSettings, px: float) -> Shot:
     array = settings.array
-    sides = (max(size, APERTURE_SIDE) if size > 1 else 1 for size in (array.rows, array.cols))
-    grid = settings.grid or (next(sides), next(sides))
+    grid = settings.grid or _aperture_grid(settings, px)
     lens = array.viewpoints(*grid)
+    if settings.grid is None:
+        lens = tuple(place for place in lens if _in_round_aperture(array, place))
     return Shot(
         lambda _: lens, lambda viewpoint, views: light_field.refocus(array, views, viewpoint, px), grid=grid
     )
+
+
+def _aperture_grid(settings: ShotSettings, px: float) -> Grid:
+    """Views so dense that nothing jumps from one to the next; less dense where there would be too many."""
+    array = settings.array
+    blur = max(abs(extreme - px) for extreme in settings.extremes_px) / APERTURE_SHIFT_PX
+    rows = 1 + math.ceil(blur * array.rho * (array.rows - 1))
+    cols = 1 + math.ceil(blur * (array.cols - 1))
+    while rows * cols > MAX_VIEWS:
+        rows, cols = max(1, rows - (rows > 1)), max(1, cols - (cols > 1))
+    return rows, cols
+
+
+def _in_round_aperture(array: CameraArray, place: Viewpoint) -> bool:
+    offsets = [
+        2 * at / (count - 1) - 1 if count > 1 else 0.0
+        for at, count in ((place.row, array.rows), (place.col, array.cols))
+    ]
+    return offsets[0] ** 2 + offsets[1] ** 2 <= 1 + 1e-9
 
 
 def _side_by_side(settings: ShotSettings) -> Shot:
@@ -143,21 +185,21 @@ def _mosaic(settings: ShotSettings) -> Shot:
     def compose(_: Viewpoint, views: Iterator[RenderedView]) -> Picture:
         return mosaic([[view.pixels for view in islice(views, grid[1])] for _ in range(grid[0])])
 
-    return _converging(settings, Shot(lambda _: everywhere, compose, moves=False, grid=grid))
+    shot = Shot(lambda _: everywhere, compose, moves=False, grid=grid)
+    # Such a mosaic shows the views as they are.
+    return shot if settings.convergence_px is None else _converging(settings, shot)
 
 
 def _quilt(settings: ShotSettings) -> Shot:
     _want_columns(settings, "quilt")
     rows, cols = settings.grid or QUILT_GRID
-    # The cameras are parallel: as they are, everything would float before the display.
-    focused = replace(settings, focus_px=settings.median_px) if settings.focus_px is None else settings
     shot = Shot(
         lambda viewpoint: _along_row(settings.array, viewpoint, rows * cols),
         lambda _, views: light_field.quilt([view.pixels for view in views], rows, cols),
         moves=False,
         grid=(rows, cols),
     )
-    return _converging(focused, shot)
+    return _converging(settings, shot)
 
 
 def _epipolar(settings: ShotSettings) -> Shot:
@@ -173,7 +215,9 @@ def _epipolar(settings: ShotSettings) -> Shot:
     def compose(_: Viewpoint, views: Iterator[RenderedView]) -> Picture:
         return light_field.epipolar_slice((view.pixels for view in views), along_column=along_column)
 
-    return _converging(settings, Shot(places, compose, moves=False))
+    shot = Shot(places, compose, moves=False)
+    # A slice shows the slopes of lines; they are sheared only where that is asked for.
+    return shot if settings.convergence_px is None else _converging(settings, shot)
 
 
 STYLES: dict[str, Callable[[ShotSettings], Shot]] = {
@@ -214,10 +258,11 @@ def _rendered(
 
 
 def _converging(settings: ShotSettings, shot: Shot) -> Shot:
-    """The shot with the disparity in focus, if there is one, at the same place in all its views."""
-    px, array = settings.focus_px, settings.array
-    if px is None:
-        return shot
+    """The shot with the disparity of the screen's plane at the same place in all its views.
+
+    The cameras are parallel: as they are, everything would float before the screen.
+    """
+    px, array = settings.screen_px, settings.array
 
     def compose(viewpoint: Viewpoint, views: Iterator[RenderedView]) -> Picture:
         places = shot.places(viewpoint)
