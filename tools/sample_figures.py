@@ -22,7 +22,7 @@ from mvcodec.evaluation.quality import QualityMeter
 from mvcodec.evaluation.regions import bad_pixels, regions
 from mvcodec.frames import DisparityMap
 from mvcodec.output.atomic import write_bytes
-from mvcodec.output.sample import write_sample
+from mvcodec.output.scene_folder import write_sample
 from mvcodec.scenes.scene import SceneSettings
 from mvcodec.stereo.matchers import MATCHERS
 from mvcodec.synthesis.synthesizers import SYNTHESIZERS
