@@ -51,10 +51,9 @@ def open_input(
             no time in common.
     """
     timing, reading = timing or Timing(), reading or Reading()
-    paths = [Path(name) for name in inputs]
-    if not paths:
-        raise SettingError("INPUT", "nothing", "an array folder, or video files and `grid`, RxC")
     given = [Path(path) for path in ([paths] if isinstance(paths, str | os.PathLike) else paths)]
+    if not given:
+        raise SettingError("INPUT", "nothing", "an array folder, or video files and `grid`, RxC")
     for path in given:
         if not path.exists():
             raise InputError(path, "nothing there", "an array folder or a video file")
