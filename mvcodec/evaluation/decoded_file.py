@@ -56,6 +56,11 @@ class DecodedFile:
         """The coded views."""
         return self.array.real
 
+    @property
+    def has_given(self) -> bool:
+        """False: its maps are its decoder's business."""
+        return False
+
     def frame_sets(
         self, frames: slice | None = None, views: Collection[Position] | None = None
     ) -> Iterator[FrameSet]:
