@@ -51,3 +51,22 @@ function apart(pairs: Uint8Array): { u: Uint8Array; v: Uint8Array } {
   }
   return { u, v };
 }
+
+/** A small RGB picture of planes (BT.709, limited range), by taking every so many-th pixel. */
+export function smallPicture(planes: Planes, width: number): ImageData {
+  const step = planes.width / Math.min(width, planes.width);
+  const [columns, rows] = [Math.floor(planes.width / step), Math.max(Math.floor(planes.height / step), 1)];
+  const out = new ImageData(columns, rows);
+  const half = (planes.width + 1) >> 1;
+  for (let j = 0; j < rows; j++) {
+    for (let i = 0; i < columns; i++) {
+      const [x, y] = [Math.floor(i * step), Math.floor(j * step)];
+      const chroma = (y >> 1) * half + (x >> 1);
+      const luma = (255 / 219) * (planes.y[y * planes.width + x] - 16);
+      const cb = (255 / 224) * (planes.u[chroma] - 128);
+      const cr = (255 / 224) * (planes.v[chroma] - 128);
+      out.data.set([luma + 1.5748 * cr, luma - 0.1873 * cb - 0.4681 * cr, luma + 1.8556 * cb, 255], 4 * (j * columns + i));
+    }
+  }
+  return out;
+}

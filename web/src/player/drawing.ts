@@ -1,7 +1,7 @@
 /** One picture of the screen: one view, or two for both eyes. */
 
 import type { Header } from "../container/header.ts";
-import { clampView, type Viewpoint } from "../geometry.ts";
+import { cellRho, clampView, steps, type Viewpoint } from "../geometry.ts";
 import type { CameraFrame } from "../synthesis/camera_textures.ts";
 import type { ViewRenderer } from "../synthesis/renderer.ts";
 import type { Shown } from "./engine.ts";
@@ -21,6 +21,27 @@ export function eyesOf(header: Header, view: Viewpoint, distance: number): [View
   return [clampView(header, { row: view.row, col: middle - half }), clampView(header, { row: view.row, col: middle + half })];
 }
 
+/** Viewpoints each way over which a picture with a focus is averaged, and how far they reach, in cells. */
+const APERTURE = 4;
+const APERTURE_CELLS = 0.3;
+
+/** The viewpoints of a wide lens around one, within the cell's reach, and how much each moves a px of disparity. */
+export function apertureOf(header: Header, view: Viewpoint): { view: Viewpoint; moves: readonly [number, number] }[] {
+  const step = steps(header);
+  const spread = (size: number) =>
+    size === 0 ? [0] : Array.from({ length: APERTURE }, (_, i) => ((i + 0.5) / APERTURE - 0.5) * APERTURE_CELLS * size);
+  return spread(step.row).flatMap((down) =>
+    spread(step.col).map((across) => {
+      const there = clampView(header, { row: view.row + down, col: view.col + across });
+      const moves = [
+        step.col ? (view.col - there.col) / step.col : 0,
+        step.row ? (cellRho(header) * (view.row - there.row)) / step.row : 0,
+      ] as const;
+      return { view: there, moves };
+    }),
+  );
+}
+
 /** Draw what is to be shown on the canvas, with a share of the picture's size each way. */
 export function drawShown(
   renderer: ViewRenderer, canvas: HTMLCanvasElement, header: Header,
@@ -33,8 +54,16 @@ export function drawShown(
     canvas.width = width * (isWide ? 2 : 1);
     canvas.height = height;
   }
-  const settings = { look: shown.look, fine, dolly: shown.dolly };
+  const settings = { look: shown.look, fine, dolly: shown.dolly, wipe: shown.wipe };
   const area = { x: 0, y: 0, width, height };
+  const { focus } = shown;
+  if (focus !== undefined) {
+    apertureOf(header, shown.view).forEach(({ view, moves }, i) => {
+      const offset = [moves[0] * focus, moves[1] * focus] as const;
+      renderer.draw(frames, view, { ...settings, fine: false, offset, share: 1 / (i + 1) }, area, null);
+    });
+    return;
+  }
   if (shown.eyes.mode === "one") {
     renderer.draw(frames, shown.view, settings, area, null);
     return;

@@ -1,67 +1,154 @@
-/** `<mvcodec-player src view autoplay>`: the player as a custom element. */
+/** `<mvcodec-player src view autoplay>`: the player as a custom element; the page is one with `page`. */
 
 import { BlobSource, HttpSource, type Source } from "../container/sources.ts";
 import type { Viewpoint } from "../geometry.ts";
 import type { Pixels } from "../synthesis/renderer.ts";
+import { element } from "./dom.ts";
 import { Engine } from "./engine.ts";
+import { parseView } from "./format.ts";
+import styles from "./style.css";
+import { TEXTS } from "./texts.ts";
+import { Ui } from "./ui.ts";
+
+/** The detail of a `frame` event. */
+export interface FrameDetail {
+  readonly frame: number;
+  readonly seconds: number;
+  readonly view: Viewpoint;
+}
+
+/** The detail of an `error` event. */
+export interface ErrorDetail {
+  readonly message: string;
+  /** Nothing more is shown. Otherwise it goes on, without what is damaged. */
+  readonly isFatal: boolean;
+}
+
+const SHEET = new CSSStyleSheet();
+SHEET.replaceSync(styles);
 
 export class MvcodecPlayer extends HTMLElement {
   static readonly observedAttributes = ["src", "view"];
-  readonly canvas = document.createElement("canvas");
+  readonly #canvas = element("canvas", { class: "picture" });
+  readonly #ui: Ui;
   #engine: Engine | undefined;
   #ready: Promise<void> | undefined;
 
   constructor() {
     super();
-    this.attachShadow({ mode: "open" }).append(this.canvas);
+    const root = this.attachShadow({ mode: "open" });
+    root.adoptedStyleSheets = [SHEET];
+    this.#ui = new Ui(this, root, this.#canvas, (from) => void this.open(from).catch(() => {}));
   }
 
   connectedCallback(): void {
-    if (this.#ready !== undefined) return;
-    const embedded = this.hasAttribute("page") ? document.getElementById("recording") : null;
-    const src = this.getAttribute("src");
-    if (embedded !== null) void this.#openEmbedded(embedded.textContent ?? "").catch(() => {});
-    else if (src !== null) void this.open(src).catch(() => {});
+    this.#ui.connect();
+    if (this.#ready === undefined) this.#openFirst();
   }
 
-  /** A recording that lies in the page itself, as base64. */
-  async #openEmbedded(text: string): Promise<void> {
-    const answer = await fetch(`data:application/octet-stream;base64,${text}`);
-    return this.open(await answer.blob());
+  disconnectedCallback(): void {
+    this.#ui.disconnect();
+    this.#engine?.close();
+    this.#engine = this.#ready = undefined;
   }
 
-  /** Resolves when the first picture is on the screen. */
+  attributeChangedCallback(name: string, before: string | null, value: string | null): void {
+    if (!this.isConnected || before === value || value === null) return;
+    const view = parseView(value);
+    if (name === "src") void this.open(value).catch(() => {});
+    else if (view !== undefined && this.#engine?.isOpen) void this.look(view.row, view.col);
+  }
+
+  /** Resolves when the first picture is on the screen; rejects where there can be none. */
   get ready(): Promise<void> {
     return this.#ready ?? Promise.reject(new Error("no src"));
   }
 
-  get engine(): Engine | undefined {
-    return this.#engine;
-  }
-
-  open(from: string | Blob): Promise<void> {
+  /** Show a file: its address, or one that the page has. Resolves as `ready` does. */
+  open(from: string | Blob, at: { seconds?: number; view?: Viewpoint | undefined } = {}): Promise<void> {
     this.#engine?.close();
-    const engine = new Engine(this.canvas, {
-      onFrame: () => this.dispatchEvent(new CustomEvent("frame", { detail: { frame: engine.frame, view: engine.shown.view } })),
-      onState: () => {},
-      onWaiting: () => {},
-      onTrouble: (text, isFatal) => this.dispatchEvent(new CustomEvent("error", { detail: { message: text, isFatal } })),
+    const engine = new Engine(this.#canvas, {
+      onFrame: () => {
+        this.#ui.drawn();
+        const detail: FrameDetail = { frame: engine.frame, seconds: engine.timeOf(engine.frame), view: engine.shown.view };
+        this.dispatchEvent(new CustomEvent("frame", { detail }));
+      },
+      onState: () => this.#ui.update(),
+      onWaiting: (isWaiting) => this.#ui.wait(isWaiting ? TEXTS.waitingPicture : undefined),
+      onTrouble: (message, isFatal) => this.#tell({ message, isFatal }),
     });
     this.#engine = engine;
-    const source: Promise<Source> = typeof from === "string" ? HttpSource.open(from) : Promise.resolve(new BlobSource(from));
-    this.#ready = source.then((bytes) => engine.open(bytes));
+    this.#ui.attach(engine);
+    this.#ui.wait(TEXTS.waitingFile);
+    this.#ready = this.#start(engine, from, at);
     return this.#ready;
   }
 
-  seek(frame: number): Promise<void> {
-    return this.#engine!.seek(frame);
+  /** Show a frame, counted from 0; resolves when it is on the screen. */
+  async seek(frame: number): Promise<void> {
+    await this.ready;
+    await this.#engine!.seek(frame);
   }
 
-  look(row: number, col: number): Promise<void> {
-    return this.#engine!.look({ row, col } satisfies Viewpoint);
+  /** Show a viewpoint, in steps of the array; resolves when it is on the screen. */
+  async look(row: number, col: number): Promise<void> {
+    await this.ready;
+    this.#ui.endSway();
+    await this.#engine!.look({ row, col });
   }
 
+  play(): void {
+    this.#engine?.play();
+  }
+
+  pause(): void {
+    this.#engine?.pause();
+  }
+
+  /** The view that is shown, at picture size. Throws Error before the first picture. */
   pixels(): Pixels {
-    return this.#engine!.pixels();
+    if (this.#engine === undefined) throw new Error("no picture yet");
+    return this.#engine.pixels();
+  }
+
+  #openFirst(): void {
+    const isPage = this.hasAttribute("page");
+    const asked = isPage ? new URLSearchParams(location.search) : new URLSearchParams();
+    const at = {
+      seconds: Math.max(Number(asked.get("t") ?? 0) || 0, 0),
+      view: parseView(asked.get("view") ?? this.getAttribute("view")),
+    };
+    const embedded = isPage ? document.getElementById("recording") : null;
+    const src = asked.get("src") ?? this.getAttribute("src");
+    if (embedded !== null) void this.#openEmbedded(embedded.textContent ?? "", at).catch(() => {});
+    else if (src !== null) void this.open(src, at).catch(() => {});
+    else this.#ui.tell(TEXTS.noFile);
+  }
+
+  /** A recording that lies in the page itself, as base64. */
+  async #openEmbedded(text: string, at: { seconds: number; view: Viewpoint | undefined }): Promise<void> {
+    const bytes = fetch(`data:application/octet-stream;base64,${text}`).then((answer) => answer.blob());
+    this.#ready = bytes.then((blob) => this.open(blob, at));
+    return this.#ready;
+  }
+
+  async #start(engine: Engine, from: string | Blob, at: { seconds?: number; view?: Viewpoint | undefined }): Promise<void> {
+    try {
+      if (!("VideoDecoder" in globalThis)) throw new Error(TEXTS.noWebCodecs);
+      const source: Source = typeof from === "string" ? await HttpSource.open(from) : new BlobSource(from);
+      await engine.open(source, at);
+    } catch (error) {
+      if (engine === this.#engine) this.#tell({ message: (error as Error).message, isFatal: true });
+      throw error;
+    }
+    if (engine !== this.#engine) return;
+    this.#ui.opened(at.view !== undefined);
+    if (this.hasAttribute("autoplay")) engine.play();
+  }
+
+  #tell(detail: ErrorDetail): void {
+    this.#ui.wait(undefined);
+    this.#ui.tell(detail.message);
+    this.dispatchEvent(new CustomEvent("error", { detail }));
   }
 }

@@ -1,14 +1,16 @@
 /** What is shown: a recording, a frame and a viewpoint, drawn when they change and not otherwise. */
 
 import type { Header } from "../container/header.ts";
+import { topicOf } from "../container/messages.ts";
 import { openRecording } from "../container/open.ts";
-import { frameAt, frameCount, timeOf, type Recording } from "../container/recording.ts";
+import { frameAt, frameCount, keySpanAt, timeOf, type Recording } from "../container/recording.ts";
 import type { Source } from "../container/sources.ts";
 import { FrameStore } from "../decode/frame_store.ts";
-import { clampView, contributors, type Camera, type Viewpoint } from "../geometry.ts";
+import { smallPicture } from "../decode/planes.ts";
+import { clampView, contributors, infinityOf, nearestCamera, type Camera, type Viewpoint } from "../geometry.ts";
 import type { CameraFrame } from "../synthesis/camera_textures.ts";
 import { ViewRenderer, type Look, type Pixels } from "../synthesis/renderer.ts";
-import { drawShown, eyesOf, type Eyes } from "./drawing.ts";
+import { apertureOf, drawShown, eyesOf, type Eyes } from "./drawing.ts";
 import { Playback } from "./playback.ts";
 import { Tempo } from "./tempo.ts";
 
@@ -32,6 +34,10 @@ export interface Shown {
   /** See `ViewSettings.dolly`. */
   dolly: number;
   eyes: Eyes;
+  /** See `ViewSettings.wipe`. */
+  wipe: number;
+  /** Disparity that is in focus, px; undefined: everything is. */
+  focus: number | undefined;
 }
 
 interface Decoded {
@@ -45,11 +51,13 @@ interface Decoded {
 const WAITING_MS = 250;
 /** Frames that are decoded ahead while playing. */
 const PREFETCH = 4;
+/** 1 - 1 / the most that what is nearest is enlarged by. */
+const MOST_DOLLY = 0.2;
 /** The picture stands when nothing has changed for so long. */
 const STANDS_MS = 120;
 
 export class Engine {
-  readonly shown: Shown = { frame: 0, view: { row: 0, col: 0 }, look: "picture", dolly: 0, eyes: { mode: "one", distance: 0.5 } };
+  readonly shown: Shown = { frame: 0, view: { row: 0, col: 0 }, look: "picture", dolly: 0, eyes: { mode: "one", distance: 0.5 }, wipe: 0, focus: undefined };
   readonly playback = new Playback();
   readonly tempo = new Tempo();
   readonly #canvas: HTMLCanvasElement;
@@ -59,9 +67,14 @@ export class Engine {
   #store: FrameStore | undefined;
   #renderer: ViewRenderer | undefined;
   #decoded: Decoded | undefined;
+  #peeks: FrameStore | undefined;
+  #peeked = 0;
+  /** How long the last frame took to decode. */
+  decodeMs = 0;
   #isFetching = false;
   #isDirty = false;
   #isFinal = false;
+  #drawnView: Viewpoint | undefined;
   #tick: number | undefined;
   #stands: ReturnType<typeof setTimeout> | undefined;
   #waiters: { isDone: () => boolean; resolve: () => void }[] = [];
@@ -100,6 +113,7 @@ export class Engine {
     clearTimeout(this.#stands);
     this.#recording?.close();
     this.#store?.close();
+    this.#peeks?.close();
     this.#waiters.splice(0).forEach(({ resolve }) => resolve());
   }
 
@@ -179,6 +193,33 @@ export class Engine {
     return pixels;
   }
 
+  /** What is seen at a place of the picture, from its upper left in shares of its size. */
+  probe(x: number, y: number): { disparity: number; isSeen: boolean } | undefined {
+    if (this.#renderer === undefined || this.#decoded === undefined || this.shown.eyes.mode !== "one") return undefined;
+    const { width, height } = this.header;
+    const { view, look, dolly } = this.shown;
+    const [column, row] = [Math.floor(x * width), Math.floor(y * height)];
+    if (column < 0 || row < 0 || column >= width || row >= height) return undefined;
+    return this.#renderer.probe(this.#decoded.frames, view, { look, dolly, fine: false }, column, row);
+  }
+
+  /** A small picture of a time, from the nearest camera and keyframe; undefined where it is damaged. */
+  async peek(seconds: number, width: number): Promise<ImageData | undefined> {
+    if (this.#recording === undefined) return undefined;
+    const { spans } = this.#recording;
+    this.#peeks ??= new FrameStore(this.#recording, () => {}); // its decoders do not disturb those that play
+    const frame = keySpanAt(spans, frameAt(spans, seconds)).first;
+    const topic = topicOf(nearestCamera(this.header, this.shown.view), "video");
+    const number = ++this.#peeked;
+    const planes = await this.#peeks.planes(topic, frame, () => number === this.#peeked);
+    return planes && smallPicture(planes, width);
+  }
+
+  /** The limit of `dolly`: what is nearest is enlarged by a quarter at most, which keeps holes few. */
+  get mostDolly(): number {
+    return MOST_DOLLY / Math.max(this.header.range[1] - infinityOf(this.header), 1e-3);
+  }
+
   /** Look whether there is something to do, with the next picture of the screen. */
   wake(): void {
     this.#isDirty = true;
@@ -203,7 +244,9 @@ export class Engine {
       this.shown.frame = this.frameAt(playback.timeAt(now));
       if (!playback.isPlaying) this.#events.onState();
     }
-    if (this.#fetch() && this.#isDirty) {
+    // While the next frame is decoded, the one that is there can be seen from elsewhere.
+    const isReady = this.#fetch() || this.#drawnView !== this.shown.view;
+    if (isReady && this.#isDirty && this.#decoded !== undefined) {
       this.#isDirty = false;
       const moves = playback.isPlaying || this.#stands !== undefined;
       this.#draw(!moves || this.tempo.isQuick);
@@ -228,6 +271,7 @@ export class Engine {
   #draw(isFinal: boolean): void {
     if (this.#renderer === undefined || this.#decoded === undefined) return;
     this.#isFinal = isFinal;
+    this.#drawnView = this.shown.view;
     drawShown(this.#renderer, this.#canvas, this.header, this.#decoded.frames, this.shown, isFinal ? 1 : this.tempo.detail, isFinal);
   }
 
@@ -239,7 +283,6 @@ export class Engine {
     const asked = wanted.map(({ row, col }) => `${row},${col}`).join(" ");
     if (this.#decoded?.frame === frame && this.#decoded.asked === asked) return true;
     if (!this.#isFetching) void this.#decode(frame, wanted, asked);
-    // While the next frame is decoded the one that is there may be seen from elsewhere.
     return false;
   }
 
@@ -247,8 +290,9 @@ export class Engine {
   #wanted(): Camera[] {
     const { header } = this;
     const found = new Map<string, Camera>();
-    const { view, eyes } = this.shown;
-    for (const one of eyes.mode === "one" ? [view] : eyesOf(header, view, eyes.distance)) {
+    const { view, eyes, focus } = this.shown;
+    const lens = focus === undefined ? [view] : apertureOf(header, view).map((one) => one.view);
+    for (const one of eyes.mode === "one" ? lens : eyesOf(header, view, eyes.distance)) {
       for (const { camera } of contributors(header, one)) found.set(`${camera.row},${camera.col}`, camera);
     }
     return [...found.values()];
@@ -257,10 +301,12 @@ export class Engine {
   async #decode(frame: number, wanted: readonly Camera[], asked: string): Promise<void> {
     this.#isFetching = true;
     const timer = setTimeout(() => this.#events.onWaiting(true), WAITING_MS);
+    const since = performance.now();
     try {
       const store = this.#store!;
       const isWanted = () => this.playback.isPlaying || this.shown.frame === frame;
       const frames = await store.get(frame, wanted, isWanted);
+      this.decodeMs = performance.now() - since;
       if (frames.length > 0 && store === this.#store) this.#decoded = { frame, frames, asked };
       else if (frames.length === 0 && isWanted()) this.#skip(frame, asked);
       if (this.playback.isPlaying) this.#prefetch(frame, wanted);

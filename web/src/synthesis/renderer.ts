@@ -12,13 +12,22 @@ import viewFragment from "./view.frag.glsl";
 /** What a view shows, in the order of `view.frag.glsl`. */
 export const LOOKS = ["picture", "disparity", "layers", "provenance", "disagreement"] as const;
 export type Look = (typeof LOOKS)[number];
+const RAW = LOOKS.length;
 
 export interface ViewSettings {
   readonly look: Look;
+  /** Disparity in 16 bits in place of the look. */
+  readonly raw?: boolean;
   /** Cubic fetch; else linear, which is quicker. */
   readonly fine: boolean;
   /** How far the view stands ahead of the cameras' plane: 1 / the disparity of what it would touch, px from infinity. */
   readonly dolly: number;
+  /** Share of the width, from the left, that shows the picture whatever the look. */
+  readonly wipe?: number;
+  /** px that the picture is moved by. */
+  readonly offset?: readonly [number, number];
+  /** How much of what was drawn before this replaces; everything where absent. */
+  readonly share?: number;
   /** Which of red, green and blue are drawn. */
   readonly mask?: readonly [boolean, boolean, boolean];
 }
@@ -84,6 +93,21 @@ export class ViewRenderer {
     this.#drawView(shifts, weights, settings, area, target);
   }
 
+  /** Disparity of one pixel of a view, px, and whether any camera sees it. */
+  probe(frames: readonly CameraFrame[], view: Viewpoint, settings: ViewSettings, x: number, y: number): { disparity: number; isSeen: boolean } {
+    const { width, height, range } = this.#header;
+    const texture = new Texture(this.gl, 4, 1, 1);
+    const target = framebufferOf(this.gl, texture);
+    this.draw(frames, view, { ...settings, fine: false, raw: true }, { x: -x, y: -y, width, height }, target);
+    const data = new Uint8Array(4);
+    this.gl.bindFramebuffer(this.gl.FRAMEBUFFER, target);
+    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, data);
+    this.gl.deleteFramebuffer(target);
+    texture.delete();
+    const share = (data[0] + data[1] / 255) / 255;
+    return { disparity: range[0] + share * (range[1] - range[0]), isSeen: data[2] === 0 };
+  }
+
   /** A view's pixels at picture size. */
   read(frames: readonly CameraFrame[], view: Viewpoint, settings: ViewSettings): Pixels {
     const { gl } = this;
@@ -133,12 +157,21 @@ export class ViewRenderer {
     gl.uniform2i(view.at("uSize"), this.#header.width, this.#header.height);
     gl.uniform4f(view.at("uArea"), area.x, area.y, area.width, area.height);
     gl.uniform1i(view.at("uFromTop"), target === null ? 0 : 1);
-    gl.uniform1i(view.at("uLook"), LOOKS.indexOf(settings.look));
+    gl.uniform2f(view.at("uOffset"), ...(settings.offset ?? [0, 0]));
+    gl.uniform1f(view.at("uWipe"), settings.wipe ?? 0);
+    gl.uniform1i(view.at("uLook"), settings.raw ? RAW : LOOKS.indexOf(settings.look));
     gl.uniform1i(view.at("uFine"), settings.fine ? 1 : 0);
     gl.uniform1i(view.at("uSoftens"), weights.filter((weight) => weight > 0).length > 1 ? 1 : 0);
     const [red, green, blue] = settings.mask ?? [true, true, true];
     gl.colorMask(red, green, blue, true);
+    if (settings.share !== undefined) {
+      gl.enable(gl.BLEND);
+      gl.blendEquation(gl.FUNC_ADD);
+      gl.blendColor(0, 0, 0, settings.share);
+      gl.blendFunc(gl.CONSTANT_ALPHA, gl.ONE_MINUS_CONSTANT_ALPHA);
+    }
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.BLEND);
     gl.colorMask(true, true, true, true);
   }
 

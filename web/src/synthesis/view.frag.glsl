@@ -16,7 +16,9 @@ uniform float uInfinity;         // disparity of infinitely distant points, px
 uniform ivec2 uSize;             // of the picture, px
 uniform vec4 uArea;              // x, y, width, height of what is drawn
 uniform bool uFromTop;           // the first row drawn is the picture's first
+uniform vec2 uOffset;            // px that the picture is moved by
 uniform int uLook;
+uniform float uWipe;             // share of the width, from the left, that shows the picture whatever the look
 uniform bool uFine;              // cubic fetch and soft contours
 uniform bool uSoftens;           // more than one camera: a real camera's own contours are soft already
 
@@ -38,6 +40,7 @@ const int DISPARITY = 1;
 const int LAYERS = 2;
 const int PROVENANCE = 3;
 const int DISAGREEMENT = 4;
+const int RAW = 5;              // disparity in 16 bits, for programs
 
 float px(float code) {
     return mix(uRange.x, uRange.y, code);
@@ -283,7 +286,7 @@ vec3 soften(vec2 at, float d, vec3 own) {
 
 void main() {
     vec2 drawn = (gl_FragCoord.xy - uArea.xy) / uArea.zw;
-    vec2 at = vec2(drawn.x, uFromTop ? drawn.y : 1.0 - drawn.y) * vec2(uSize) - 0.5;
+    vec2 at = vec2(drawn.x, uFromTop ? drawn.y : 1.0 - drawn.y) * vec2(uSize) - 0.5 + uOffset;
     float background;
     bool isEdge;
     float d = surfaceAt(at, background, isEdge);
@@ -295,12 +298,14 @@ void main() {
     if (uFine && isEdge && uSoftens) yuv = soften(at, d, yuv);
     float t = (d - uRange.x) / (uRange.y - uRange.x);
     vec3 colour = rgb(yuv);
-    if (uLook == DISPARITY) colour = ramp(t);
-    if (uLook == LAYERS) colour = ramp((floor(t * 11.99) + 0.5) / 12.0) * (0.35 + 0.65 * colour.g);
-    if (uLook == PROVENANCE) {
+    int look = drawn.x < uWipe ? 0 : uLook;
+    if (look == DISPARITY) colour = ramp(t);
+    if (look == LAYERS) colour = ramp((floor(t * 11.99) + 0.5) / 12.0) * (0.35 + 0.65 * colour.g);
+    if (look == PROVENANCE) {
         vec3 by = seen == 0 ? vec3(0.9, 0.2, 0.2) : seen == 1 ? vec3(0.95, 0.7, 0.2) : vec3(0.1, 0.35 + 0.15 * float(seen), 0.4);
         colour = mix(vec3(colour.g), by, 0.7);
     }
-    if (uLook == DISAGREEMENT) colour = ramp(min(sqrt(max(squares - sum.r * sum.r, 0.0)) * 12.0, 1.0));
+    if (look == DISAGREEMENT) colour = ramp(min(sqrt(max(squares - sum.r * sum.r, 0.0)) * 12.0, 1.0));
+    if (look == RAW) colour = vec3(floor(t * 255.0) / 255.0, fract(t * 255.0), seen == 0 ? 1.0 : 0.0);
     oColour = vec4(colour, 1.0);
 }

@@ -1,0 +1,40 @@
+/** Which key does what; `KEYS` of the texts lists them for people. */
+
+import { SPEEDS } from "./playback.ts";
+import type { Ui } from "./ui.ts";
+
+export function keyActions(ui: Ui): ReadonlyMap<string, () => void> {
+  const nextSpeed = (by: number) => {
+    const place = SPEEDS.findIndex((speed) => speed >= ui.speed);
+    ui.changeSpeed(SPEEDS[Math.min(Math.max(place + by, 0), SPEEDS.length - 1)]);
+  };
+  return new Map([
+    [" ", () => ui.togglePlay()],
+    ["k", () => ui.togglePlay()],
+    ["ArrowLeft", () => ui.lookBy(0, -1)],
+    ["ArrowRight", () => ui.lookBy(0, 1)],
+    ["ArrowUp", () => ui.lookBy(-1, 0)],
+    ["ArrowDown", () => ui.lookBy(1, 0)],
+    [",", () => ui.step(-1)],
+    [".", () => ui.step(1)],
+    ["j", () => ui.skip(-1)],
+    ["l", () => ui.skip(1)],
+    ["Home", () => ui.seekTo(0)],
+    ["End", () => ui.seekTo(Infinity)],
+    ["+", () => nextSpeed(1)],
+    ["-", () => nextSpeed(-1)],
+    ["a", () => ui.markSection("from")],
+    ["b", () => ui.markSection("to")],
+    ["v", () => ui.nextLook()],
+    ["e", () => ui.nextEyes()],
+    ["w", () => ui.dolly(0.2)],
+    ["s", () => ui.dolly(-0.2)],
+    ["h", () => ui.toggleHover()],
+    ["p", () => ui.savePicture()],
+    ["c", () => void ui.copyLink()],
+    ["o", () => ui.openFile()],
+    ["f", () => ui.toggleFullscreen()],
+    ["i", () => ui.toggleStatistics()],
+    ["?", () => ui.showHelp()],
+  ]);
+}

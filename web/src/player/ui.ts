@@ -1,0 +1,411 @@
+/** What surrounds the picture: controls, gestures, keys, messages; and how they act on the engine. */
+
+import { depthOf } from "../geometry.ts";
+import { LOOKS } from "../synthesis/renderer.ts";
+import { Controls } from "./controls.ts";
+import { button, element, icon } from "./dom.ts";
+import { EYE_MODES } from "./drawing.ts";
+import type { Engine } from "./engine.ts";
+import { Gestures } from "./gestures.ts";
+import { keyActions } from "./keys.ts";
+import { statistics } from "./statistics.ts";
+import { swayAt } from "./sway.ts";
+import { linkTo, saveClip, savePicture } from "./take_away.ts";
+import { KEYS, TEXTS } from "./texts.ts";
+
+/** Controls hide when nothing happens for so long. */
+const IDLE_MS = 3000;
+const HINT_MS = 4000;
+const PEEK_PX = 160;
+/** Cells that a drag over the whole picture looks around. */
+const DRAG_CELLS = 1.2;
+/** Share of the array that hovering from edge to edge, or turning a phone by 45 degrees, looks around. */
+const HOVER_SHARE = 0.3;
+const TURN_DEGREES = 45;
+const KEY_STEP = 0.125;
+
+export class Ui {
+  readonly #host: HTMLElement;
+  readonly #canvas: HTMLCanvasElement;
+  readonly #open: (from: Blob) => void;
+  readonly #stage = element("div", { class: "stage", tabindex: "0", role: "application", "aria-label": TEXTS.stage });
+  readonly #wait = element("p", { class: "wait", role: "status", hidden: true });
+  readonly #big = button(TEXTS.play, icon("play"), () => this.togglePlay());
+  readonly #hint = element("p", { class: "hint", hidden: true }, TEXTS.hint);
+  readonly #notice = element("div", { class: "notice", role: "alert", hidden: true });
+  readonly #stats = element("pre", { class: "stats", hidden: true });
+  readonly #probe = element("p", { class: "probe", hidden: true });
+  readonly #spoken = element("p", { class: "unseen", role: "status" });
+  readonly #dialog = element("dialog", { "aria-label": TEXTS.help });
+  readonly #file = element("input", { type: "file", accept: ".mcap", hidden: true });
+  readonly #poster = element("img", { class: "poster", alt: "", hidden: true });
+  readonly controls: Controls;
+  readonly #keys: ReadonlyMap<string, () => void>;
+  #gestures: Gestures | undefined;
+  #engine: Engine | undefined;
+  #swaySince: number | undefined;
+  #isTouched = false;
+  #hasPlayed = false;
+  #hovers = true;
+  /** Where hovering and turning look around from. */
+  #home = { row: 0, col: 0 };
+  #idle: ReturnType<typeof setTimeout> | undefined;
+  #stop = new AbortController();
+
+  constructor(host: HTMLElement, root: ShadowRoot, canvas: HTMLCanvasElement, open: (from: Blob) => void) {
+    this.#host = host;
+    this.#canvas = canvas;
+    this.#open = open;
+    this.controls = new Controls(this.#actions());
+    this.#keys = keyActions(this);
+    this.#big.classList.add("big", "fills");
+    this.#big.hidden = true;
+    this.#stage.append(canvas, this.#poster);
+    const middle = element("div", { class: "middle" }, this.#wait, this.#big);
+    root.append(this.#stage, middle, this.#hint, this.#stats, this.#probe, this.controls.bar, this.controls.menu,
+      this.#notice, this.#spoken, this.#dialog, this.#file);
+    this.#makeDialog();
+  }
+
+  connect(): void {
+    this.#stop = new AbortController();
+    const { signal } = this.#stop;
+    this.#gestures = new Gestures(this.#stage, {
+      onTouch: () => this.endSway(),
+      onDrag: (across, down) => this.#drag(across, down),
+      onHover: (at) => this.#hover(at),
+      onDolly: (by) => this.dolly(by),
+      onClick: () => this.#click(),
+      onDoubleClick: () => this.toggleFullscreen(),
+      onTurn: (right, down) => this.#peer(right / TURN_DEGREES, down / TURN_DEGREES),
+    });
+    // The page listens everywhere, an element within another page only where it has the focus.
+    const keyboard: EventTarget = this.#host.hasAttribute("page") ? document : this.#host;
+    keyboard.addEventListener("keydown", (event) => this.#key(event as KeyboardEvent), { signal });
+    this.#host.addEventListener("pointermove", () => this.#awake(), { signal });
+    this.#host.addEventListener("focusin", () => this.#awake(), { signal });
+    this.#host.addEventListener("dragover", (event) => event.preventDefault(), { signal });
+    this.#host.addEventListener("drop", (event) => {
+      event.preventDefault();
+      const [file] = event.dataTransfer?.files ?? [];
+      if (file !== undefined) this.#open(file);
+    }, { signal });
+    this.#file.addEventListener("change", () => {
+      const [file] = this.#file.files ?? [];
+      if (file !== undefined) this.#open(file);
+    }, { signal });
+    const poster = this.#host.getAttribute("poster");
+    this.#poster.hidden = poster === null;
+    if (poster !== null) this.#poster.src = poster;
+    this.#awake();
+  }
+
+  disconnect(): void {
+    this.#stop.abort();
+    this.#gestures?.close();
+    clearTimeout(this.#idle);
+  }
+
+  attach(engine: Engine): void {
+    this.#engine = engine;
+    this.#notice.hidden = true;
+    this.#hasPlayed = false;
+  }
+
+  /** The first picture is there. */
+  opened(isViewGiven: boolean): void {
+    const engine = this.#engine!;
+    this.controls.setRange(engine.header.range);
+    this.#home = { ...engine.shown.view };
+    this.#big.hidden = engine.count < 2 || this.#host.hasAttribute("autoplay");
+    if (engine.header.mapCameras === "none") this.tell(TEXTS.noMaps);
+    const isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (!this.#isTouched && !isViewGiven && !isStill) {
+      this.#swaySince = performance.now();
+      requestAnimationFrame((now) => this.#sway(now));
+      this.#hint.hidden = false;
+      setTimeout(() => (this.#hint.hidden = true), HINT_MS);
+    }
+    this.update();
+  }
+
+  /** A picture is on the screen. */
+  drawn(): void {
+    this.#poster.hidden = true;
+    this.wait(undefined);
+    this.update();
+  }
+
+  update(): void {
+    const engine = this.#engine;
+    if (engine === undefined || !engine.isOpen) return;
+    const { playback, shown } = engine;
+    this.#hasPlayed ||= playback.isPlaying;
+    if (this.#hasPlayed) this.#big.hidden = true;
+    this.controls.update({
+      isPlaying: playback.isPlaying,
+      seconds: engine.timeOf(engine.frame),
+      duration: engine.timeOf(engine.count - 1),
+      speed: playback.speed,
+      look: shown.look,
+      eyes: shown.eyes.mode,
+      section: playback.section,
+      isGrowing: engine.isGrowing,
+    });
+    if (!this.#stats.hidden) this.#stats.textContent = statistics(engine);
+  }
+
+  /** Show what is waited for, or that nothing is. */
+  wait(what: string | undefined): void {
+    this.#wait.hidden = what === undefined;
+    if (what !== undefined) this.#wait.textContent = what;
+  }
+
+  tell(text: string): void {
+    const close = button(TEXTS.dismiss, "×", () => (this.#notice.hidden = true));
+    this.#notice.replaceChildren(element("p", {}, text), close);
+    this.#notice.hidden = false;
+  }
+
+  endSway(): void {
+    this.#isTouched = true;
+    this.#hint.hidden = true;
+    if (this.#swaySince !== undefined && this.#engine?.isOpen) this.#home = { ...this.#engine.shown.view };
+    this.#swaySince = undefined;
+    this.#awake();
+  }
+
+  togglePlay(): void {
+    if (this.#engine?.playback.isPlaying) this.#engine.pause();
+    else this.#engine?.play();
+  }
+
+  step(by: number): void {
+    this.#engine?.pause();
+    void this.#engine?.seek(this.#engine.shown.frame + by);
+  }
+
+  seekTo(seconds: number): void {
+    void this.#engine?.seek(this.#engine.frameAt(seconds));
+  }
+
+  /** By some seconds, or a tenth of a short file. */
+  skip(direction: number): void {
+    const engine = this.#engine;
+    if (engine === undefined) return;
+    const duration = engine.timeOf(engine.count - 1);
+    this.seekTo(engine.timeOf(engine.shown.frame) + direction * Math.min(5, Math.max(duration / 10, 0.1)));
+  }
+
+  lookBy(down: number, across: number): void {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return;
+    const { view } = engine.shown;
+    void engine.look({ row: view.row + down * KEY_STEP * this.#cell("row"), col: view.col + across * KEY_STEP * this.#cell("col") });
+    this.#home = { ...engine.shown.view };
+  }
+
+  dolly(by: number): void {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return;
+    void engine.change({ dolly: Math.min(Math.max(engine.shown.dolly + by * engine.mostDolly, 0), engine.mostDolly) });
+  }
+
+  changeSpeed(speed: number): void {
+    this.#engine?.playback.setSpeed(speed);
+    this.update();
+  }
+
+  get speed(): number {
+    return this.#engine?.playback.speed ?? 1;
+  }
+
+  /** The loop begins, or ends, at the frame that is shown; where it is there already it ends. */
+  markSection(end: "from" | "to"): void {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return;
+    const { playback } = engine;
+    const now = engine.timeOf(engine.frame);
+    const last = engine.timeOf(engine.count - 1);
+    const old = playback.section ?? { from: 0, to: last };
+    const next = { ...old, [end]: now };
+    playback.section = Math.abs(old[end] - now) < 1e-6 || next.from >= next.to ? undefined : next;
+    this.update();
+  }
+
+  nextLook(): void {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return;
+    const look = LOOKS[(LOOKS.indexOf(engine.shown.look) + 1) % LOOKS.length];
+    void engine.change({ look });
+    this.#spoken.textContent = TEXTS.looks[look];
+    this.update();
+  }
+
+  nextEyes(): void {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return;
+    const mode = EYE_MODES[(EYE_MODES.indexOf(engine.shown.eyes.mode) + 1) % EYE_MODES.length];
+    void engine.change({ eyes: { ...engine.shown.eyes, mode } });
+    this.#spoken.textContent = TEXTS.eyes[mode];
+    this.update();
+  }
+
+  toggleHover(): void {
+    this.#hovers = !this.#hovers;
+  }
+
+  toggleStatistics(): void {
+    this.#stats.hidden = !this.#stats.hidden;
+    this.update();
+  }
+
+  toggleFullscreen(): void {
+    if (document.fullscreenElement !== null) void document.exitFullscreen();
+    else void this.#host.requestFullscreen?.().catch(() => {}); // not allowed within some pages
+  }
+
+  showHelp(): void {
+    this.#dialog.showModal();
+  }
+
+  openFile(): void {
+    this.#file.click();
+  }
+
+  savePicture(): void {
+    const engine = this.#engine;
+    if (engine?.isOpen) void savePicture(engine.pixels(), `${engine.header.name || "view"}-${engine.frame}`);
+  }
+
+  async saveClip(): Promise<void> {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return;
+    const { from, to } = engine.playback.section ?? { from: 0, to: engine.timeOf(engine.count - 1) };
+    this.tell(TEXTS.recording);
+    await engine.seek(engine.frameAt(from));
+    engine.play();
+    await saveClip(this.#canvas, Math.max((to - from) / engine.playback.speed, 0.2), engine.header.name || "view");
+    this.#notice.hidden = true;
+  }
+
+  async copyLink(): Promise<void> {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return;
+    const link = linkTo(engine.shown.view, engine.timeOf(engine.frame));
+    await navigator.clipboard.writeText(link).then(() => this.tell(TEXTS.linkCopied), () => this.tell(link));
+  }
+
+  #actions() {
+    return {
+      togglePlay: () => this.togglePlay(),
+      step: (by: number) => this.step(by),
+      seekTo: (seconds: number) => this.seekTo(seconds),
+      setSpeed: (speed: number) => this.changeSpeed(speed),
+      setLook: (look: (typeof LOOKS)[number]) => void this.#engine?.change({ look }),
+      setEyes: (mode: (typeof EYE_MODES)[number]) => void this.#engine?.change({ eyes: { mode, distance: 0.5 } }),
+      setWipe: (wipe: number) => void this.#engine?.change({ wipe }),
+      setFocus: (focus: number | undefined) => void this.#engine?.change({ focus }),
+      savePicture: () => this.savePicture(),
+      saveClip: () => void this.saveClip(),
+      copyLink: () => void this.copyLink(),
+      openFile: () => this.openFile(),
+      toggleFullscreen: () => this.toggleFullscreen(),
+      showHelp: () => this.showHelp(),
+      enterVr: () => {},
+      peek: async (seconds: number) => this.#engine?.peek(seconds, PEEK_PX),
+    };
+  }
+
+  #makeDialog(): void {
+    const close = button(TEXTS.close, TEXTS.close, () => this.#dialog.close());
+    const list = element("dl");
+    for (const [keys, text] of KEYS) {
+      list.append(element("dt", {}, ...keys.split(" ").map((key) => element("kbd", {}, key))), element("dd", {}, text));
+    }
+    this.#dialog.append(element("form", {}, element("h2", {}, TEXTS.help), close), list);
+  }
+
+  #cell(axis: "row" | "col"): number {
+    const { realRows, realCols } = this.#engine!.header;
+    const places = axis === "row" ? realRows : realCols;
+    return places.length > 1 ? places[1] - places[0] : 0;
+  }
+
+  #drag(across: number, down: number): void {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return;
+    const { view } = engine.shown;
+    // What is under the pointer goes with it: the eye moves the other way.
+    void engine.look({ row: view.row - down * DRAG_CELLS * this.#cell("row"), col: view.col - across * DRAG_CELLS * this.#cell("col") });
+    this.#home = { ...engine.shown.view };
+  }
+
+  #hover(at: { x: number; y: number } | undefined): void {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return;
+    this.#probe.hidden = true;
+    if (at === undefined || !this.#hovers) return;
+    this.endSway();
+    this.#peer(at.x - 0.5, at.y - 0.5);
+    if (!engine.playback.isPlaying && engine.shown.look !== "picture") this.#showProbe(at);
+  }
+
+  /** Look around from home by shares of what hovering reaches. */
+  #peer(right: number, down: number): void {
+    const engine = this.#engine;
+    if (!engine?.isOpen || this.#swaySince !== undefined || !this.#hovers) return;
+    const { rows, cols } = engine.header;
+    void engine.look({ row: this.#home.row + down * HOVER_SHARE * (rows - 1), col: this.#home.col + right * HOVER_SHARE * (cols - 1) });
+  }
+
+  #showProbe(at: { x: number; y: number }): void {
+    const engine = this.#engine!;
+    const { width, height } = engine.header;
+    const box = this.#stage.getBoundingClientRect();
+    const scale = Math.min(box.width / width, box.height / height);
+    const x = 0.5 + ((at.x - 0.5) * box.width) / (width * scale);
+    const y = 0.5 + ((at.y - 0.5) * box.height) / (height * scale);
+    const found = engine.probe(x, y);
+    if (found === undefined) return;
+    this.#probe.textContent = TEXTS.disparity(found.disparity, depthOf(engine.header, found.disparity));
+    this.#probe.style.left = `${at.x * box.width + 14}px`;
+    this.#probe.style.top = `${at.y * box.height + 14}px`;
+    this.#probe.hidden = false;
+  }
+
+  #sway(now: number): void {
+    const engine = this.#engine;
+    if (this.#swaySince === undefined || !engine?.isOpen || !this.#host.isConnected) return;
+    const { rows, cols } = engine.header;
+    void engine.look(swayAt(rows, cols, Math.max(now - this.#swaySince, 0)));
+    requestAnimationFrame((next) => this.#sway(next));
+  }
+
+  #click(): void {
+    if (!this.controls.menu.hidden) this.controls.toggleMenu(false);
+    else this.togglePlay();
+  }
+
+  #key(event: KeyboardEvent): void {
+    const target = event.composedPath()[0];
+    if (event.ctrlKey || event.metaKey || event.altKey || target instanceof HTMLSelectElement || this.#dialog.open) return;
+    if (target instanceof HTMLInputElement && /^(Arrow|Home|End)/.test(event.key)) return;
+    if (target instanceof HTMLButtonElement && (event.key === " " || event.key === "Enter")) return;
+    if (target instanceof HTMLInputElement && target.type !== "range") return;
+    const action = this.#keys.get(event.key);
+    if (action === undefined) return;
+    event.preventDefault();
+    this.endSway();
+    action();
+  }
+
+  #awake(): void {
+    this.#stage.classList.remove("idle");
+    clearTimeout(this.#idle);
+    this.#idle = setTimeout(() => {
+      const hasFocus = this.controls.bar.matches(":focus-within") && this.controls.bar.querySelector(":focus-visible") !== null;
+      if (!hasFocus && this.controls.menu.hidden && !this.controls.bar.matches(":hover")) this.#stage.classList.add("idle");
+    }, IDLE_MS);
+  }
+}
