@@ -93,7 +93,7 @@ def _measure_views(decoded: DecodedSet, stages: dict[str, Stage], synthesizer: S
 @contextmanager
 def playing(path: Path) -> Iterator[tuple[str, int]]:
     """Run ``mvcodec play``; its WebSocket's URL and its process id."""
-    command = [sys.executable, "-m", "mvcodec", "play", str(path), "--no-browser"]
+    command = [sys.executable, "-m", "mvcodec", "play", str(path), "--no-browser", "--renderer", "server"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     try:

@@ -86,9 +86,10 @@ class Running:
 
 
 @contextmanager
-def playing(*arguments: str | Path, port: int = 0) -> Iterator[Running]:
+def playing(*arguments: str | Path, port: int = 0, renderer: str = "server") -> Iterator[Running]:
     """Run ``mvcodec play`` until the end of the block."""
-    command = [*COMMAND, "play", *map(str, arguments), "--no-browser", "--port", str(port)]
+    options = ("--no-browser", "--port", str(port), "--renderer", renderer)
+    command = [*COMMAND, "play", *map(str, arguments), *options]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=sys.stderr, text=True)
     try:
         assert process.stdout is not None

@@ -5,19 +5,22 @@ from __future__ import annotations
 import argparse
 import re
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from importlib.util import find_spec
 
-from mvcodec.cli.arguments import add_matcher, add_synthesizer, check_matcher
+from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_matcher, add_synthesizer, check_matcher
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
-from mvcodec.errors import MissingExtra
+from mvcodec.container.reader import McapReader
+from mvcodec.errors import MissingExtra, SettingError
 from mvcodec.synthesis.synthesizers import make_synthesizer, quicker_synthesizer
 
 EXTRA = "play"
 PACKAGES = ("starlette", "uvicorn", "websockets")
 MAX_PORT = 65535
+RENDERERS = ("web", "server")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=_port, default=0, help="0 takes any free one (default: 0)")
     parser.add_argument("--no-browser", action="store_true", help="print the URL, open no browser")
+    parser.add_argument(
+        "--renderer",
+        choices=RENDERERS,
+        help="who decodes and synthesises: the browser (web), or this program, which sends pictures; "
+        "default: web; server with --original, --synthesizer or --matcher, and for a file without maps",
+    )
     add_synthesizer(parser)
     add_matcher(parser)
     add_on_error(parser, "skip")
@@ -40,10 +49,56 @@ def run(arguments: argparse.Namespace) -> None:
     for package in PACKAGES:
         if find_spec(package) is None:
             raise MissingExtra(package, EXTRA)
+    if arguments.renderer == "web" and arguments.original is not None:
+        raise SettingError("original", arguments.original, "`renderer` server with it")
+    if _renderer(arguments) == "web":
+        _serve_file(arguments)
+    else:
+        _serve_pictures(arguments)
+
+
+def _renderer(arguments: argparse.Namespace) -> str:
+    """Who renders: as asked, else whoever can do what is asked for."""
+    if arguments.renderer is not None:
+        return str(arguments.renderer)
+    asks_this_program = (
+        arguments.original is not None
+        or arguments.matcher is not None
+        or arguments.synthesizer != DEFAULT_SYNTHESIZER
+    )
+    if asks_this_program:
+        return "server"
+    with McapReader.open(arguments.input, limits_of(arguments)) as reader:
+        return "server" if reader.header.disparity_cameras == "none" else "web"
+
+
+def _serve_file(arguments: argparse.Namespace) -> None:
+    """The page decodes by itself; this program hands it the file."""
+    from mvcodec.player.serving import serve
+    from mvcodec.player.web_server import make_web_app
+
+    with McapReader.open(arguments.input, limits_of(arguments)):  # what is no file of ours is told at once
+        pass
+    _serve(serve, partial(make_web_app, arguments.input), arguments)
+
+
+def _serve(serve: Callable[..., None], make: Callable[..., object], arguments: argparse.Namespace) -> None:
+    with suppress(KeyboardInterrupt):
+        serve(
+            make,
+            arguments.host,
+            arguments.port,
+            on_ready=_announce,
+            open_browser=not arguments.no_browser,
+        )
+
+
+def _serve_pictures(arguments: argparse.Namespace) -> None:
+    """This program decodes and synthesises, and sends pictures."""
     from mvcodec.capture import open_input
     from mvcodec.player.originals import Originals
     from mvcodec.player.picture_maker import PictureMaker
-    from mvcodec.player.server import Broadcast
+    from mvcodec.player.server import Broadcast, make_app
     from mvcodec.player.serving import serve
     from mvcodec.player.warming import warm_up_beside
 
@@ -68,14 +123,7 @@ def run(arguments: argparse.Namespace) -> None:
             stop_on_damage=arguments.on_error == "stop",
         )
         warm_up_beside(makers, _tell_compiling)
-        with suppress(KeyboardInterrupt):
-            serve(
-                broadcast,
-                arguments.host,
-                arguments.port,
-                on_ready=_announce,
-                open_browser=not arguments.no_browser,
-            )
+        _serve(serve, partial(make_app, broadcast), arguments)
     finally:
         maker.close()
 

@@ -79,10 +79,10 @@ def make_app(broadcast: Broadcast, rules: AccessRules) -> ASGIApp:
         Route("/" if name == "index.html" else f"/{name}", _page_file(name)) for name in _page_names()
     ]
     routes.append(WebSocketRoute("/view", viewers.serve))
-    return _Guard(Starlette(routes=routes), rules)
+    return Guard(Starlette(routes=routes), rules)
 
 
-class _Guard:
+class Guard:
     """Refuses what the access rules refuse, before anything else looks at it."""
 
     def __init__(self, app: ASGIApp, rules: AccessRules) -> None:

@@ -11,11 +11,11 @@ import webbrowser
 from collections.abc import Callable
 
 import uvicorn
+from starlette.types import ASGIApp
 
 from mvcodec.errors import MvCodecWarning, SettingError
 from mvcodec.player.access import AccessRules, is_loopback
 from mvcodec.player.messages import MAX_MESSAGE_BYTES
-from mvcodec.player.server import Broadcast, make_app
 
 SWITCH_S = 0.0005
 """A picture is made in some twenty steps that each wait for the interpreter; at Python's own 5 ms a thread
@@ -36,7 +36,7 @@ GRACE_S = 2
 
 
 def serve(
-    broadcast: Broadcast,
+    make: Callable[[AccessRules], ASGIApp],
     host: str,
     port: int,
     *,
@@ -46,6 +46,7 @@ def serve(
     """Serve until Ctrl-C or SIGTERM.
 
     Args:
+        make: makes the application, which must keep the rules.
         host: address or name to bind to; beyond loopback it is warned about.
         port: 0 takes any free one.
         on_ready: called with the page's URL once the port is bound.
@@ -61,7 +62,7 @@ def serve(
             text = f"`host` {host}: everyone who reaches this machine over the network can watch this file"
             warnings.warn(text, MvCodecWarning, stacklevel=2)
         config = uvicorn.Config(
-            make_app(broadcast, AccessRules(host)),
+            make(AccessRules(host)),
             log_level="warning",
             access_log=False,
             server_header=False,

@@ -25,7 +25,7 @@ export class FileDecoder {
     const source = typeof from === "string" ? await HttpSource.open(from) : new BlobSource(from);
     const troubles: string[] = [];
     const tell = (text: string) => void troubles.push(text);
-    return new FileDecoder(await openRecording(source, { fromSeconds: 0, tell, onGrowth: () => {} }), troubles);
+    return new FileDecoder(await openRecording(source, { fromSeconds: 0, tell }), troubles);
   }
 
   get header(): Header {

@@ -47,6 +47,8 @@ export class IndexedRecording implements Recording {
   readonly #tell: Tell;
   readonly #kept = new Map<number, Promise<readonly FrameSet[]>>();
   readonly #size: bigint;
+  /** The first thing that was wrong: why there is no header. */
+  #failure: unknown;
 
   private constructor(source: Source, size: bigint, reader: McapIndexedReader, tell: Tell) {
     this.#source = source;
@@ -69,7 +71,7 @@ export class IndexedRecording implements Recording {
       await recording.load(span);
       if (recording.#assembler.header !== undefined) return recording;
     }
-    throw new FileError("no header that can be read", "a file that mvcodec encoded");
+    throw recording.#failure ?? new FileError("no header that can be read", "a file that mvcodec encoded");
   }
 
   get header(): Header {
@@ -112,6 +114,7 @@ export class IndexedRecording implements Recording {
       if (sets.length > span.count) throw new FileError(`${sets.length} frame sets`, `${span.count} by the index`);
       return sets;
     } catch (error) {
+      this.#failure ??= error;
       const from = (Number(span.startNs) / 1e9).toFixed(3);
       this.#tell(`${from}..${(Number(span.endNs) / 1e9).toFixed(3)} s: damage (${(error as Error).message})`);
       return [];

@@ -11,8 +11,8 @@ export interface Opening {
   readonly fromSeconds: number;
   /** Damage, and what was made of it. */
   readonly tell: Tell;
-  /** A growing file has more frame sets. */
-  readonly onGrowth: () => void;
+  /** A growing file has more frame sets; without this no file is followed. */
+  readonly onGrowth?: () => void;
 }
 
 /** Throws FileError. */

@@ -14,6 +14,8 @@ import type { Source } from "./sources.ts";
 const BLOCK_BYTES = 1n << 20n;
 /** A file that another program writes is looked at so often. */
 const POLL_MS = 500;
+/** After so many looks that find nothing new it is taken to be complete: a minute. */
+const MOST_QUIET = 120;
 /** Fields of a chunk in front of the name of its compression. */
 const CHUNK_HEAD = 28;
 
@@ -28,6 +30,8 @@ export class StreamedRecording implements Recording {
   #at = BigInt(MCAP_MAGIC.length);
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isEnd = false;
+  /** Looks in a row that found nothing new. */
+  #quiet = 0;
   #isBroken = false;
 
   private constructor(source: Source, tell: Tell) {
@@ -37,7 +41,7 @@ export class StreamedRecording implements Recording {
   }
 
   /** Read what is there. Where the source can grow, go on reading as it does. Throws FileError. */
-  static async open(source: Source, tell: Tell, onGrowth: () => void): Promise<StreamedRecording> {
+  static async open(source: Source, tell: Tell, onGrowth?: () => void): Promise<StreamedRecording> {
     const recording = new StreamedRecording(source, tell);
     const start = await source.read(0n, bigMin(await source.size(), BigInt(MCAP_MAGIC.length)));
     const view = new DataView(start.buffer, start.byteOffset, start.byteLength);
@@ -45,12 +49,12 @@ export class StreamedRecording implements Recording {
       throw new FileError(start.length === 0 ? "an empty file" : "a file that is not MCAP", "a file that mvcodec encoded");
     }
     await recording.#readOn();
-    recording.growing = !recording.#isEnd && source.grow !== undefined;
+    recording.growing = !recording.#isEnd && source.grow !== undefined && onGrowth !== undefined;
     if (!recording.#isEnd && !recording.growing) await recording.#salvage();
     if (recording.#assembler.header === undefined || recording.spans.length === 0) {
       throw new FileError("no frame set that can be read", "a file that mvcodec encoded");
     }
-    if (recording.growing) recording.#follow(onGrowth);
+    if (recording.growing && onGrowth !== undefined) recording.#follow(onGrowth);
     return recording;
   }
 
@@ -70,14 +74,16 @@ export class StreamedRecording implements Recording {
   #follow(onGrowth: () => void): void {
     this.#timer = setTimeout(async () => {
       try {
+        this.#quiet++;
         if (await this.#source.grow?.()) {
+          this.#quiet = 0;
           await this.#readOn();
           onGrowth();
         }
       } catch (error) {
         this.#tell((error as Error).message);
       }
-      this.growing &&= !this.#isEnd;
+      this.growing &&= !this.#isEnd && this.#quiet < MOST_QUIET;
       if (this.growing) this.#follow(onGrowth);
       else onGrowth();
     }, POLL_MS);
