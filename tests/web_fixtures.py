@@ -102,8 +102,8 @@ def chromium() -> Iterator[Browser]:
 
 @pytest.fixture
 def tab(chromium: Browser) -> Iterator[Page]:
-    """A page whose errors fail the test, and whose requests must stay on this machine."""
-    page = chromium.new_page(viewport={"width": 960, "height": 600})
+    """A page whose errors fail the test, and whose requests must stay on this machine. Nothing sways."""
+    page = chromium.new_page(viewport={"width": 960, "height": 600}, reduced_motion="reduce")
     troubles: list[str] = []
     page.on("pageerror", lambda error: troubles.append(str(error)))
     page.on("request", lambda request: troubles.append(request.url) if _is_foreign(request.url) else None)

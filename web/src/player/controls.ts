@@ -68,9 +68,9 @@ export class Controls {
     this.#play = button(TEXTS.play, icon("play"), () => actions.togglePlay());
     this.#vr = button(TEXTS.enterVr, TEXTS.enterVr, () => actions.enterVr());
     this.#vr.hidden = true;
-    options(this.#speed, Object.fromEntries(SPEEDS.map((speed) => [String(speed), `${speed}×`])));
-    options(this.#look, TEXTS.looks);
-    options(this.#eyes, TEXTS.eyes);
+    options(this.#speed, SPEEDS.map((speed) => [String(speed), `${speed}×`]));
+    options(this.#look, Object.entries(TEXTS.looks));
+    options(this.#eyes, Object.entries(TEXTS.eyes));
     this.menu = this.#makeMenu();
     this.bar = this.#makeBar();
     this.#listen();

@@ -41,6 +41,6 @@ export function button(label: string, content: Node | string, onClick: () => voi
   return made;
 }
 
-export function options(select: HTMLSelectElement, texts: Readonly<Record<string, string>>): void {
-  select.replaceChildren(...Object.entries(texts).map(([value, text]) => element("option", { value }, text)));
+export function options(select: HTMLSelectElement, choices: readonly (readonly [value: string, text: string])[]): void {
+  select.replaceChildren(...choices.map(([value, text]) => element("option", { value }, text)));
 }

@@ -2,8 +2,9 @@
 
 import { BlobSource, HttpSource, type Source } from "../container/sources.ts";
 import type { Viewpoint } from "../geometry.ts";
-import type { Pixels } from "../synthesis/renderer.ts";
+import type { Look, Pixels } from "../synthesis/renderer.ts";
 import { element } from "./dom.ts";
+import type { Eyes } from "./drawing.ts";
 import { Engine } from "./engine.ts";
 import { parseView } from "./format.ts";
 import styles from "./style.css";
@@ -22,6 +23,19 @@ export interface ErrorDetail {
   readonly message: string;
   /** Nothing more is shown. Otherwise it goes on, without what is damaged. */
   readonly isFatal: boolean;
+}
+
+/** What the player shows. */
+export interface ShownState {
+  readonly frame: number;
+  readonly count: number;
+  readonly view: Viewpoint;
+  readonly look: Look;
+  readonly dolly: number;
+  readonly eyes: Eyes["mode"];
+  readonly isPlaying: boolean;
+  readonly speed: number;
+  readonly section: { from: number; to: number } | null;
 }
 
 const SHEET = new CSSStyleSheet();
@@ -53,7 +67,8 @@ export class MvcodecPlayer extends HTMLElement {
   }
 
   attributeChangedCallback(name: string, before: string | null, value: string | null): void {
-    if (!this.isConnected || before === value || value === null) return;
+    // What stands there from the start is read with `connectedCallback`, which comes later.
+    if (this.#ready === undefined || before === value || value === null) return;
     const view = parseView(value);
     if (name === "src") void this.open(value).catch(() => {});
     else if (view !== undefined && this.#engine?.isOpen) void this.look(view.row, view.col);
@@ -95,6 +110,15 @@ export class MvcodecPlayer extends HTMLElement {
     await this.ready;
     this.#ui.endSway();
     await this.#engine!.look({ row, col });
+  }
+
+  /** What is on the screen, and how it is played. Undefined before a file is open. */
+  get shown(): ShownState | undefined {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return undefined;
+    const { view, look, dolly, eyes } = engine.shown;
+    const { isPlaying, speed, section = null } = engine.playback;
+    return { frame: engine.frame, count: engine.count, view, look, dolly, eyes: eyes.mode, isPlaying, speed, section };
   }
 
   play(): void {

@@ -78,7 +78,7 @@ export class Engine {
   #tick: number | undefined;
   #stands: ReturnType<typeof setTimeout> | undefined;
   #waiters: { isDone: () => boolean; resolve: () => void }[] = [];
-  #isClosed = false;
+  isClosed = false;
 
   constructor(canvas: HTMLCanvasElement, events: EngineEvents) {
     this.#canvas = canvas;
@@ -94,7 +94,7 @@ export class Engine {
       tell: (text) => this.#events.onTrouble(text, false),
       onGrowth: () => this.#grown(),
     });
-    if (this.#isClosed) return recording.close();
+    if (this.isClosed) return recording.close();
     this.#source = source;
     this.#recording = recording;
     this.#store = new FrameStore(recording, (text) => this.#events.onTrouble(text, false));
@@ -107,7 +107,7 @@ export class Engine {
   }
 
   close(): void {
-    this.#isClosed = true;
+    this.isClosed = true;
     this.playback.pause();
     if (this.#tick !== undefined) cancelAnimationFrame(this.#tick);
     clearTimeout(this.#stands);
@@ -223,7 +223,7 @@ export class Engine {
   /** Look whether there is something to do, with the next picture of the screen. */
   wake(): void {
     this.#isDirty = true;
-    if (this.#tick === undefined && !this.#isClosed) this.#tick = requestAnimationFrame((now) => this.#run(now));
+    if (this.#tick === undefined && !this.isClosed) this.#tick = requestAnimationFrame((now) => this.#run(now));
   }
 
   async #settled(): Promise<void> {

@@ -8,8 +8,9 @@ import { EYE_MODES } from "./drawing.ts";
 import type { Engine } from "./engine.ts";
 import { Gestures } from "./gestures.ts";
 import { keyActions } from "./keys.ts";
+import { Looking } from "./looking.ts";
+import { Section, type Mark } from "./section.ts";
 import { statistics } from "./statistics.ts";
-import { swayAt } from "./sway.ts";
 import { linkTo, saveClip, savePicture } from "./take_away.ts";
 import { KEYS, TEXTS } from "./texts.ts";
 
@@ -17,12 +18,6 @@ import { KEYS, TEXTS } from "./texts.ts";
 const IDLE_MS = 3000;
 const HINT_MS = 4000;
 const PEEK_PX = 160;
-/** Cells that a drag over the whole picture looks around. */
-const DRAG_CELLS = 1.2;
-/** Share of the array that hovering from edge to edge, or turning a phone by 45 degrees, looks around. */
-const HOVER_SHARE = 0.3;
-const TURN_DEGREES = 45;
-const KEY_STEP = 0.125;
 
 export class Ui {
   readonly #host: HTMLElement;
@@ -43,12 +38,10 @@ export class Ui {
   readonly #keys: ReadonlyMap<string, () => void>;
   #gestures: Gestures | undefined;
   #engine: Engine | undefined;
-  #swaySince: number | undefined;
+  readonly looking = new Looking();
+  #section = new Section();
   #isTouched = false;
   #hasPlayed = false;
-  #hovers = true;
-  /** Where hovering and turning look around from. */
-  #home = { row: 0, col: 0 };
   #idle: ReturnType<typeof setTimeout> | undefined;
   #stop = new AbortController();
 
@@ -72,12 +65,12 @@ export class Ui {
     const { signal } = this.#stop;
     this.#gestures = new Gestures(this.#stage, {
       onTouch: () => this.endSway(),
-      onDrag: (across, down) => this.#drag(across, down),
+      onDrag: (across, down) => this.looking.drag(across, down),
       onHover: (at) => this.#hover(at),
       onDolly: (by) => this.dolly(by),
       onClick: () => this.#click(),
       onDoubleClick: () => this.toggleFullscreen(),
-      onTurn: (right, down) => this.#peer(right / TURN_DEGREES, down / TURN_DEGREES),
+      onTurn: (right, down) => this.looking.turn(right, down),
     });
     // The page listens everywhere, an element within another page only where it has the focus.
     const keyboard: EventTarget = this.#host.hasAttribute("page") ? document : this.#host;
@@ -110,19 +103,19 @@ export class Ui {
     this.#engine = engine;
     this.#notice.hidden = true;
     this.#hasPlayed = false;
+    this.#section = new Section();
   }
 
   /** The first picture is there. */
   opened(isViewGiven: boolean): void {
     const engine = this.#engine!;
     this.controls.setRange(engine.header.range);
-    this.#home = { ...engine.shown.view };
     this.#big.hidden = engine.count < 2 || this.#host.hasAttribute("autoplay");
     if (engine.header.mapCameras === "none") this.tell(TEXTS.noMaps);
     const isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    if (!this.#isTouched && !isViewGiven && !isStill) {
-      this.#swaySince = performance.now();
-      requestAnimationFrame((now) => this.#sway(now));
+    const sways = !this.#isTouched && !isViewGiven && !isStill;
+    this.looking.attach(engine, sways);
+    if (sways) {
       this.#hint.hidden = false;
       setTimeout(() => (this.#hint.hidden = true), HINT_MS);
     }
@@ -170,8 +163,7 @@ export class Ui {
   endSway(): void {
     this.#isTouched = true;
     this.#hint.hidden = true;
-    if (this.#swaySince !== undefined && this.#engine?.isOpen) this.#home = { ...this.#engine.shown.view };
-    this.#swaySince = undefined;
+    this.looking.endSway();
     this.#awake();
   }
 
@@ -197,14 +189,6 @@ export class Ui {
     this.seekTo(engine.timeOf(engine.shown.frame) + direction * Math.min(5, Math.max(duration / 10, 0.1)));
   }
 
-  lookBy(down: number, across: number): void {
-    const engine = this.#engine;
-    if (!engine?.isOpen) return;
-    const { view } = engine.shown;
-    void engine.look({ row: view.row + down * KEY_STEP * this.#cell("row"), col: view.col + across * KEY_STEP * this.#cell("col") });
-    this.#home = { ...engine.shown.view };
-  }
-
   dolly(by: number): void {
     const engine = this.#engine;
     if (!engine?.isOpen) return;
@@ -220,16 +204,11 @@ export class Ui {
     return this.#engine?.playback.speed ?? 1;
   }
 
-  /** The loop begins, or ends, at the frame that is shown; where it is there already it ends. */
-  markSection(end: "from" | "to"): void {
+  /** The loop begins, or ends, at the frame that is shown. */
+  markSection(mark: Mark): void {
     const engine = this.#engine;
     if (!engine?.isOpen) return;
-    const { playback } = engine;
-    const now = engine.timeOf(engine.frame);
-    const last = engine.timeOf(engine.count - 1);
-    const old = playback.section ?? { from: 0, to: last };
-    const next = { ...old, [end]: now };
-    playback.section = Math.abs(old[end] - now) < 1e-6 || next.from >= next.to ? undefined : next;
+    engine.playback.section = this.#section.mark(mark, engine.timeOf(engine.frame), engine.timeOf(engine.count - 1));
     this.update();
   }
 
@@ -249,10 +228,6 @@ export class Ui {
     void engine.change({ eyes: { ...engine.shown.eyes, mode } });
     this.#spoken.textContent = TEXTS.eyes[mode];
     this.update();
-  }
-
-  toggleHover(): void {
-    this.#hovers = !this.#hovers;
   }
 
   toggleStatistics(): void {
@@ -326,37 +301,14 @@ export class Ui {
     this.#dialog.append(element("form", {}, element("h2", {}, TEXTS.help), close), list);
   }
 
-  #cell(axis: "row" | "col"): number {
-    const { realRows, realCols } = this.#engine!.header;
-    const places = axis === "row" ? realRows : realCols;
-    return places.length > 1 ? places[1] - places[0] : 0;
-  }
-
-  #drag(across: number, down: number): void {
-    const engine = this.#engine;
-    if (!engine?.isOpen) return;
-    const { view } = engine.shown;
-    // What is under the pointer goes with it: the eye moves the other way.
-    void engine.look({ row: view.row - down * DRAG_CELLS * this.#cell("row"), col: view.col - across * DRAG_CELLS * this.#cell("col") });
-    this.#home = { ...engine.shown.view };
-  }
-
   #hover(at: { x: number; y: number } | undefined): void {
     const engine = this.#engine;
     if (!engine?.isOpen) return;
     this.#probe.hidden = true;
-    if (at === undefined || !this.#hovers) return;
+    if (at === undefined || !this.looking.hovers) return;
     this.endSway();
-    this.#peer(at.x - 0.5, at.y - 0.5);
+    this.looking.hover(at.x - 0.5, at.y - 0.5);
     if (!engine.playback.isPlaying && engine.shown.look !== "picture") this.#showProbe(at);
-  }
-
-  /** Look around from home by shares of what hovering reaches. */
-  #peer(right: number, down: number): void {
-    const engine = this.#engine;
-    if (!engine?.isOpen || this.#swaySince !== undefined || !this.#hovers) return;
-    const { rows, cols } = engine.header;
-    void engine.look({ row: this.#home.row + down * HOVER_SHARE * (rows - 1), col: this.#home.col + right * HOVER_SHARE * (cols - 1) });
   }
 
   #showProbe(at: { x: number; y: number }): void {
@@ -372,14 +324,6 @@ export class Ui {
     this.#probe.style.left = `${at.x * box.width + 14}px`;
     this.#probe.style.top = `${at.y * box.height + 14}px`;
     this.#probe.hidden = false;
-  }
-
-  #sway(now: number): void {
-    const engine = this.#engine;
-    if (this.#swaySince === undefined || !engine?.isOpen || !this.#host.isConnected) return;
-    const { rows, cols } = engine.header;
-    void engine.look(swayAt(rows, cols, Math.max(now - this.#swaySince, 0)));
-    requestAnimationFrame((next) => this.#sway(next));
   }
 
   #click(): void {

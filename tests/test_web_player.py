@@ -1,0 +1,239 @@
+"""The page's player as people use it, in a real Chromium: `mvcodec play` and the custom element."""
+
+from __future__ import annotations
+
+import http.client
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS
+from player_files import Running, playing
+from playwright.sync_api import Page, expect
+from web_fixtures import Site, open_player, pixels_of
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
+pytest_plugins = ("web_fixtures",)
+
+SAMPLE = Path(__file__).parent / "conformance" / "square.mcap"
+"""3 x 3 views of 64 x 48, six frames, ten a second."""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Running]:
+    with playing(SAMPLE, renderer="web") as running:
+        yield running
+
+
+@pytest.fixture
+def page(tab: Page, server: Running) -> Page:
+    """The page of `mvcodec play`, on view 1,1."""
+    tab.goto(f"{server.url}?view=1,1&t=0.2")
+    tab.evaluate("document.querySelector('mvcodec-player').ready")
+    return tab
+
+
+def shown(page: Page) -> dict[str, object]:
+    found: dict[str, object] = page.evaluate("document.querySelector('mvcodec-player').shown")
+    return found
+
+
+def waits_for(page: Page, condition: str) -> None:
+    """Wait until something holds of what is `shown`."""
+    page.wait_for_function(
+        f"() => {{ const shown = document.querySelector('mvcodec-player').shown; return {condition}; }}"
+    )
+
+
+def ask(server: Running, path: str, **headers: str) -> http.client.HTTPResponse:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection.request("GET", path, headers=headers)
+    return connection.getresponse()
+
+
+def test_the_server_hands_out_the_page_and_ranges_of_the_file(server: Running) -> None:
+    part = ask(server, "/video.mcap", Range="bytes=5-14")
+    assert part.status == 206
+    assert part.headers["Content-Range"] == f"bytes 5-14/{SAMPLE.stat().st_size}"
+    assert part.read() == SAMPLE.read_bytes()[5:15]
+    index = ask(server, "/")
+    assert "unsafe" not in index.headers["Content-Security-Policy"]
+    assert "<title>square.mcap</title>" in index.read().decode()
+    assert ask(server, "/../square.json").status == 404
+    assert ask(server, "/video.mcap", Host="elsewhere.example").status == 403
+
+
+def test_the_address_says_which_view_and_time(page: Page) -> None:
+    assert shown(page)["frame"] == 2
+    assert shown(page)["view"] == {"row": 1, "col": 1}
+
+
+def test_keys_step_look_and_change_what_is_shown(page: Page) -> None:
+    page.keyboard.press(".")
+    waits_for(page, "shown.frame === 3")
+    page.keyboard.press("End")
+    waits_for(page, "shown.frame === 5")
+    page.keyboard.press("ArrowRight")
+    waits_for(page, "shown.view.col > 1")
+    page.keyboard.press("v")
+    waits_for(page, "shown.look === 'disparity'")
+    page.keyboard.press("w")
+    waits_for(page, "shown.dolly > 0")
+    page.keyboard.press("i")
+    expect(page.locator(".stats")).to_contain_text("h264")
+    page.keyboard.press("?")
+    expect(page.get_by_role("dialog")).to_contain_text("look around")
+
+
+def test_space_plays_and_the_time_runs_and_loops(page: Page) -> None:
+    expect(page.locator(".time")).to_have_text("0:00.2 / 0:00.5")
+    page.keyboard.press(" ")
+    waits_for(page, "shown.isPlaying")
+    waits_for(page, "shown.frame === 5")
+    waits_for(page, "shown.frame < 2")  # it begins again
+    page.keyboard.press(" ")
+    waits_for(page, "!shown.isPlaying")
+
+
+def test_a_section_is_played_over_and_over(page: Page) -> None:
+    page.keyboard.press("a")
+    page.keyboard.press("End")
+    waits_for(page, "shown.frame === 5")
+    page.keyboard.press("b")
+    assert shown(page)["section"] == {"from": pytest.approx(0.2), "to": pytest.approx(0.5)}
+    page.keyboard.press("b")
+    assert shown(page)["section"] is None
+
+
+def test_dragging_looks_around_and_a_click_plays(page: Page) -> None:
+    page.mouse.move(480, 250)
+    page.mouse.down()
+    page.mouse.move(400, 250, steps=4)
+    page.mouse.up()
+    waits_for(page, "shown.view.col > 1.05")
+    assert not shown(page)["isPlaying"]
+    page.mouse.click(480, 250)
+    waits_for(page, "shown.isPlaying")
+    page.mouse.click(480, 250)
+    waits_for(page, "!shown.isPlaying")
+
+
+def test_the_wheel_moves_ahead_and_holes_stay_few(page: Page) -> None:
+    page.mouse.move(480, 250)
+    for _ in range(20):
+        page.mouse.wheel(0, -600)
+    waits_for(page, "shown.dolly > 0")
+    page.evaluate("document.querySelector('mvcodec-player').look(0.6, 1.3)")
+    page.get_by_label("Show").select_option("provenance")
+    waits_for(page, "shown.look === 'provenance'")
+    red = pixels_of(page).astype(int)
+    unseen = (red[..., 0] > red[..., 1] + 60) & (red[..., 0] > red[..., 2] + 60) & (red[..., 1] < 110)
+    assert unseen.mean() < 0.03
+
+
+def test_the_controls_hide_when_left_alone_and_come_back(page: Page) -> None:
+    page.mouse.move(480, 200)
+    page.wait_for_selector(".stage.idle")
+    page.mouse.move(490, 210)
+    expect(page.locator(".stage.idle")).to_have_count(0)
+
+
+def test_it_sways_until_somebody_touches_it(tab: Page, server: Running) -> None:
+    tab.emulate_media(reduced_motion="no-preference")
+    tab.goto(server.url)
+    tab.evaluate("document.querySelector('mvcodec-player').ready")
+    waits_for(tab, "shown.view.col !== 1")
+    tab.keyboard.press("ArrowLeft")
+    expect(tab.get_by_text("Drag to look around")).to_be_hidden()
+    before = shown(tab)["view"]
+    tab.evaluate("new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)))")
+    assert shown(tab)["view"] == before
+
+
+def test_reduced_motion_does_not_sway(tab: Page, server: Running) -> None:
+    tab.goto(server.url)
+    tab.evaluate("document.querySelector('mvcodec-player').ready")
+    tab.evaluate("new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)))")
+    assert shown(tab)["view"] == {"row": 1, "col": 1}
+
+
+def test_a_picture_that_stands_is_not_drawn_again(page: Page) -> None:
+    page.evaluate("""() => {
+        window.drawn = 0;
+        document.querySelector("mvcodec-player").addEventListener("frame", () => window.drawn++);
+    }""")
+    page.keyboard.press(",")
+    waits_for(page, "shown.frame === 1")
+    page.wait_for_function("window.drawn > 0")
+    # The picture that stands is drawn once more, with all detail; then nothing asks for another one.
+    page.evaluate("new Promise((resolve) => setTimeout(resolve, 600))")
+    drawn = page.evaluate("window.drawn")
+    page.evaluate("new Promise((resolve) => setTimeout(resolve, 600))")
+    assert page.evaluate("window.drawn") == drawn <= 2
+
+
+def test_the_element_in_another_page(tab: Page, site: Site) -> None:
+    site.put("square.mcap", SAMPLE.read_bytes())
+    open_player(tab, site, "square.mcap", 'view="0.5,1.25"')
+    assert shown(tab)["view"] == {"row": 0.5, "col": 1.25}
+    detail = tab.evaluate("""async () => {
+        const player = document.querySelector("mvcodec-player");
+        const drawn = new Promise((resolve) => {
+            player.addEventListener("frame", (event) => resolve(event.detail));
+        });
+        await player.seek(4);
+        await player.look(2, 0);
+        return drawn;
+    }""")
+    assert detail["frame"] == 4
+    assert shown(tab)["view"] == {"row": 2, "col": 0}
+    assert pixels_of(tab).shape == (48, 64, 3)
+
+
+def test_what_is_no_recording_is_said(tab: Page, site: Site) -> None:
+    site.put("text.mcap", b"This is no recording.")
+    tab.goto(f"{site.url}/blank.html")
+    message = tab.evaluate("""async () => {
+        await import("./player.js");
+        document.body.innerHTML = '<mvcodec-player src="text.mcap"></mvcodec-player>';
+        const player = document.querySelector("mvcodec-player");
+        const told = new Promise((resolve) => {
+            player.addEventListener("error", (event) => resolve(event.detail));
+        });
+        return [await told, await player.ready.catch((error) => error.message)];
+    }""")
+    assert message[0]["isFatal"]
+    assert "not MCAP" in message[1]
+    expect(tab.get_by_role("alert")).to_contain_text("not MCAP")
+
+
+def test_both_eyes_get_views_of_their_own(page: Page) -> None:
+    page.keyboard.press("e")
+    waits_for(page, "shown.eyes === 'side by side'")
+    page.wait_for_function(
+        "document.querySelector('mvcodec-player').shadowRoot.querySelector('canvas').width === 128"
+    )
+    page.keyboard.press("e")
+    waits_for(page, "shown.eyes === 'anaglyph'")
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "scheme"), [(390, 800, "light"), (1280, 720, "dark"), (2560, 1440, "dark")]
+)
+def test_the_controls_fit_the_screen(
+    tab: Page, server: Running, width: int, height: int, scheme: str
+) -> None:
+    tab.set_viewport_size({"width": width, "height": height})
+    tab.emulate_media(color_scheme="light" if scheme == "light" else "dark", reduced_motion="reduce")
+    tab.goto(server.url)
+    tab.evaluate("document.querySelector('mvcodec-player').ready")
+    for label in ("Play", "Show", "Speed", "More", "Full screen", "Time"):
+        box = tab.locator(".controls").get_by_label(label, exact=True).bounding_box()
+        assert box is not None
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= width
+        assert box["y"] + box["height"] <= height
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    tab.screenshot(path=SCREENSHOTS / f"web_{width}.png")
+    assert np.asarray(pixels_of(tab)).std() > 10
