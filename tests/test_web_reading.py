@@ -60,7 +60,7 @@ def with_a_hole(source: Path, target: Path) -> None:
         for schema, channel, message in reader.iter_messages(log_time_order=False):
             if channel.topic == "/mvcodec/header":
                 keyframes += 1
-                writer.flush()
+                writer.flush()  # type: ignore[no-untyped-call]
                 if keyframes == 2:
                     out.write(struct.pack("<BQ", UNKNOWN_RECORD, GIGABYTE))
                     out.seek(GIGABYTE, 1)
@@ -73,7 +73,7 @@ def with_a_hole(source: Path, target: Path) -> None:
             writer.add_message(
                 channels[channel.id], message.log_time, message.data, message.publish_time, message.sequence
             )
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     assert keyframes > 1
 
 
@@ -145,5 +145,5 @@ def test_a_header_that_asks_for_too_much_is_refused(tab: Page, site: Site) -> No
         schema = writer.register_schema("mvcodec.Header", "jsonschema", b"{}")
         channel = writer.register_channel("/mvcodec/header", "json", schema)
         writer.add_message(channel, 0, json.dumps(header).encode(), 0, 0)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     assert "pixels of a frame set" in str(read(tab, site, "hostile.mcap"))
