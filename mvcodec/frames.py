@@ -65,6 +65,19 @@ class LayerStack:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FinishedView:
+    """A virtual view out of an enhancement layer.
+
+    Attributes:
+        pixels: uint8 (H, W, 3) RGB, as decoded.
+        disparity_px: float32 (H, W), px of one cell's baseline.
+    """
+
+    pixels: Picture
+    disparity_px: FloatMap
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class DecodedSet:
     """One decoded frame set: what a synthesizer needs.
 
@@ -75,6 +88,7 @@ class DecodedSet:
         disparities: by real camera.
         disparity_range_px: (lo, hi) that the maps can hold.
         absent: real cameras that sent nothing usable; their pictures and maps are made from the others'.
+        enhanced: virtual views out of the stream's enhancement layer; those that were asked for.
     """
 
     array: CameraArray
@@ -84,6 +98,7 @@ class DecodedSet:
     disparities: Mapping[Position, DisparityMap]
     disparity_range_px: tuple[float, float]
     absent: tuple[Position, ...] = ()
+    enhanced: Mapping[Position, FinishedView] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -32,6 +32,10 @@ class TrackKind(StrEnum):
     DISPARITY = "disparity"
     PREDICTED = "predicted"
     """A camera's pictures, each coded from its own past and a prediction made from other cameras."""
+    LAYER = "enhancement"
+    """The header of the enhancement layer, see `mvcodec.enhancement`."""
+    ENHANCED = "enhanced"
+    """A virtual view's pictures, each coded from its own past and its synthesis."""
     DEPTH = "depth"
     """Metric depth for other people's tools; decoders have no use for it."""
 
@@ -47,8 +51,9 @@ class Track:
     def topic(self) -> str:
         """The topic of this track in the container, e.g. ``/camera/r00_c04/video``."""
         if self.camera is None:
-            return "/mvcodec/header"
-        return f"/camera/{view_name(self.camera)}/{self.kind.value}"
+            return f"/mvcodec/{self.kind.value}"
+        root = "view" if self.kind is TrackKind.ENHANCED else "camera"
+        return f"/{root}/{view_name(self.camera)}/{self.kind.value}"
 
 
 MAX_SEQUENCE = (1 << 32) - 1
@@ -177,11 +182,15 @@ class StreamHeader:
     def needed_tracks(self, predicted: PredictedCamera) -> set[Track]:
         """What must be decoded before a camera can be predicted."""
         pictures = {self.picture_track(camera) for camera in predicted.references}
-        places = (predicted.camera, *predicted.references)
+        return pictures | self.needed_maps(predicted.camera, predicted.references)
+
+    def needed_maps(self, place: Position, references: Sequence[Position]) -> set[Track]:
+        """The maps, and what they need, for predicting a place from references."""
+        places = (place, *references)
         maps = {camera for place in places for camera in self.maps_around(place)}
         # Half-size maps are enlarged along the edges of their cameras' pictures, if these play alone.
         alone = {track for track in map(self.picture_track, maps) if track.kind is TrackKind.TEXTURE}
-        return pictures | alone | {Track(TrackKind.DISPARITY, camera) for camera in maps}
+        return alone | {Track(TrackKind.DISPARITY, camera) for camera in maps}
 
     @property
     def map_cameras(self) -> tuple[Position, ...]:

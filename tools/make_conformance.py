@@ -12,9 +12,8 @@ import io
 import json
 import sys
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,13 +26,9 @@ from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.container import McapReader, McapWriter
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.frames import DisparityMap, FrameSet, Picture
-from mvcodec.stream import Packet, StreamHeader, Track, TrackKind
-from mvcodec.synthesis.frame_prediction import FramePrediction
-from mvcodec.video.codec import Planes
-from mvcodec.video.codecs import find_codec
-from mvcodec.video.colour import even_size
+from mvcodec.stream import Packet, TrackKind
+from mvcodec.synthesis.track_decoding import StreamTracks
 from mvcodec.video.map_size import small_size
-from mvcodec.video.track import PredictedTrackDecoder
 
 RANGE_PX = (-3.0, 9.5)
 
@@ -141,37 +136,6 @@ class _Pipe(io.BytesIO):
         return False
 
 
-def _listed(planes: Planes) -> list[Planes]:
-    return [planes]
-
-
-class _Tracks:
-    """Decodes every track of a stream, predicted ones too."""
-
-    def __init__(self, header: StreamHeader) -> None:
-        codec, size = find_codec(header.codec), even_size(header.array.width, header.array.height)
-        self._header = header
-        self._predicted = {header.picture_track(each.camera): each for each in header.predicted}
-        self._alone = {track: codec.decoder() for track in header.tracks if track not in self._predicted}
-        self._others = {track: PredictedTrackDecoder(size) for track in self._predicted}
-
-    def decode(self, packets: Sequence[Packet]) -> dict[Track, Planes]:
-        """The planes of one frame set, in the order of the tracks."""
-        found = {
-            packet.track: self._alone[packet.track].push(packet.data, packet.track.topic)[0]
-            for packet in packets
-            if packet.track in self._alone
-        }
-        frame = FramePrediction(self._header, found)
-        by_track = {packet.track: packet for packet in packets}
-        for track, each in self._predicted.items():
-            prediction = frame.predict(each.camera, each.references)
-            planes = self._others[track].push(by_track[track], track.topic, partial(_listed, prediction))
-            frame.add(each.camera, planes)
-            found[track] = planes
-        return {track: found[track] for track in self._header.tracks}
-
-
 def describe(content: bytes) -> dict[str, Any]:
     """What a conformant decoder finds: stored header, and CRC-32 of planes (cropped rows, top to bottom).
 
@@ -189,7 +153,7 @@ def describe(content: bytes) -> dict[str, Any]:
                 header = json.loads(packet.data)
             else:
                 sets.setdefault(number, []).append(packet)
-    tracks = _Tracks(known)
+    tracks = StreamTracks(known)
     frames: list[dict[str, Any]] = []
     for packets in sets.values():
         crcs = {}

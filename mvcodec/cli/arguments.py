@@ -31,6 +31,8 @@ OPTIONS = {
     "matcher": "--matcher",
     "preset": "--preset",
     "prediction": "--prediction",
+    "enhance": "--enhance",
+    "enhance_views": "--enhance-views",
     "codec": "--codec",
     "threads": "--threads",
     "anchors": "--anchors",
@@ -178,6 +180,14 @@ def positive_number(text: str) -> float:
     if not number > 0:
         raise argparse.ArgumentTypeError(f"found {text!r}, expected a number above 0")
     return number
+
+
+def position(text: str) -> tuple[int, int]:
+    """``R,C``: a place of the grid, in whole steps."""
+    match = re.fullmatch(r"(\d{1,4}),(\d{1,4})", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected R,C such as 0,2")
+    return int(match[1]), int(match[2])
 
 
 def _two_numbers(text: str, expected: str) -> tuple[float, float]:

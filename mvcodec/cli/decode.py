@@ -97,6 +97,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_synthesizer(parser)
     add_matcher(parser)
     parser.add_argument(
+        "--no-enhancement", action="store_true", help="leave the file's enhancement layer out: the base alone"
+    )
+    parser.add_argument(
         "--provenance",
         action="store_true",
         help="beside each view's picture 000000.png write 000000.provenance.png, 8-bit RGB: red = number of"
@@ -127,13 +130,21 @@ def run(arguments: argparse.Namespace) -> None:
     with (
         _source(arguments) as source,
         Decoder.open(
-            source, arguments.frames, arguments.on_error, limits_of(arguments), arguments.matcher
+            source,
+            arguments.frames,
+            arguments.on_error,
+            limits_of(arguments),
+            arguments.matcher,
+            enhanced=() if arguments.no_enhancement else None,
         ) as decoder,
         progress("decode", _frame_total(source, arguments.frames), quiet=arguments.quiet) as bar,
         ExitStack() as outputs,
     ):
         check_matcher(arguments.matcher, decoder.header)
         plan = _plan(decoder.header, arguments)
+        if decoder.enhanced is None:
+            places = (viewpoint.position for viewpoint in plan.viewpoints)
+            decoder.enhanced = [place for place in places if place is not None]
         sink: Sink | None = None
         frames = 0
         try:

@@ -25,6 +25,7 @@ from mvcodec.cli.encode_stream import (
 )
 from mvcodec.cli.info import document, simulcast_bits, summary
 from mvcodec.cli.interrupt import deferred_interrupt
+from mvcodec.cli.layer_options import add_layer, layer_settings
 from mvcodec.cli.live_view_option import add_live_view, live_view
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.picture_options import add_picture_options, reading_of
@@ -66,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="kbit/s of the pictures and maps of all cameras; 2M is 2000",
     )
     add_coding(parser)
+    add_layer(parser)
     parser.add_argument(
         "--calibration", type=Path, metavar="FILE", help="JSON with the calibration as in array.json"
     )
@@ -123,6 +125,8 @@ def _check_effect(arguments: argparse.Namespace) -> None:
         raise SettingError("--nominal", "no --depth", "--depth raw16, for which it accepts the calibration")
     if not is_stream(arguments):
         refuse_stream_options(arguments)
+    elif arguments.enhance is not None:
+        raise SettingError("--enhance", "with a recording or a stream", "an array folder or videos")
     elif arguments.dry_run or arguments.continues:
         option = "--dry-run" if arguments.dry_run else "--continues"
         raise SettingError(option, "with a recording or a stream", "an array folder or videos")
@@ -175,7 +179,7 @@ def _encode(
             Encoder(array, config, coded_before=arguments.continues) as encoder,
             progress("encode", len(chosen), quiet=arguments.quiet) as bar,
         ):
-            for frame_set in source.frame_sets(slice(chosen.start, chosen.stop)):
+            for frame_set in source.frame_sets(slice(chosen.start, chosen.stop), encoder.views):
                 packets = encoder.push(frame_set)
                 if interrupted():
                     raise KeyboardInterrupt
@@ -208,4 +212,5 @@ def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
     if arguments.depth:
         require_calibration(array, arguments.nominal)
     rates = {"qp": arguments.qp, "crf": arguments.crf, "bitrate_kbps": arguments.bitrate}
-    return checked_config(array, arguments, **rates, depth=arguments.depth is not None)
+    layer = layer_settings(arguments)
+    return checked_config(array, arguments, **rates, **layer, depth=arguments.depth is not None)

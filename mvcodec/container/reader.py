@@ -18,8 +18,11 @@ from mvcodec.container.chunks import EXPECTED, ChunkReader, OnDamage, TopicMessa
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.remote import is_url, open_url
+from mvcodec.enhancement import LAYER_TRACK
 from mvcodec.errors import InputError, MvCodecWarning, SettingError, StreamError
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind
+
+_OPTIONAL = (TrackKind.DEPTH, TrackKind.ENHANCED)
 
 
 class McapReader(Closing):
@@ -34,6 +37,7 @@ class McapReader(Closing):
         name: what to call it in messages.
         limits: what is more than that is refused.
         on_damage: told of damage, behind which reading goes on with the next keyframe; None raises it.
+        layer: deliver the enhancement layer too, if there is one.
         depth: deliver depth too, which no decoder needs; a damaged image is told and left out.
 
     Raises:
@@ -48,6 +52,7 @@ class McapReader(Closing):
         on_damage: OnDamage | None = None,
         *,
         depth: bool = False,
+        layer: bool = False,
     ) -> None:
         self.name = name
         self._limits = limits
@@ -62,7 +67,11 @@ class McapReader(Closing):
         self.header = StreamHeader.from_json(self._first_header().data, name)
         limits.check_header(self.header, name)
         depths = [Track(TrackKind.DEPTH, camera) for camera in self.header.array.real] if depth else []
-        self._tracks = {track.topic: track for track in (HEADER_TRACK, *self.header.tracks, *depths)}
+        views = self.header.array.positions if layer else ()
+        enhanced = [LAYER_TRACK, *(Track(TrackKind.ENHANCED, view) for view in views)] if layer else []
+        self._tracks = {
+            track.topic: track for track in (HEADER_TRACK, *self.header.tracks, *depths, *enhanced)
+        }
 
     @classmethod
     def open(
@@ -72,6 +81,7 @@ class McapReader(Closing):
         on_damage: OnDamage | None = None,
         *,
         depth: bool = False,
+        layer: bool = False,
     ) -> McapReader:
         """Open a path or the URL of a file on a web server, or take a binary file or pipe.
 
@@ -80,13 +90,14 @@ class McapReader(Closing):
             StreamError: as the constructor.
         """
         if not isinstance(source, str | Path):
-            return cls(source, str(getattr(source, "name", "input")), limits, on_damage, depth=depth)
+            name = str(getattr(source, "name", "input"))
+            return cls(source, name, limits, on_damage, depth=depth, layer=layer)
         try:
             file = open_url(str(source)) if is_url(str(source)) else Path(source).open("rb")  # noqa: SIM115
         except OSError as error:
             raise InputError(source, error.strerror, "a file that can be read") from None
         try:
-            reader = cls(file, str(source), limits, on_damage, depth=depth)
+            reader = cls(file, str(source), limits, on_damage, depth=depth, layer=layer)
         except BaseException:
             file.close()
             raise
@@ -218,8 +229,9 @@ class McapReader(Closing):
             return chunk
         index = chunk[-1][1].sequence
         there = {topic for topic, message in chunk if message.sequence == index}
-        optional = {track.topic for track in self._tracks.values() if track.kind is TrackKind.DEPTH}
-        due = self._tracks.keys() - {HEADER_TRACK.topic} - (optional - self._chunks.topics)
+        optional = {track.topic for track in self._tracks.values() if track.kind in _OPTIONAL}
+        with_keyframes = {HEADER_TRACK.topic, LAYER_TRACK.topic}
+        due = self._tracks.keys() - with_keyframes - (optional - self._chunks.topics)
         if due <= there:
             return chunk
         return [(topic, message) for topic, message in chunk if message.sequence != index]
@@ -242,7 +254,7 @@ class McapReader(Closing):
     def _packet(self, track: Track, message: Message, keyframe: bool) -> Packet:
         data = message.data
         source = f"{self.name}: {track.topic} at {message.log_time / 1e9:.3f} s"
-        if track is HEADER_TRACK:
+        if track.camera is None:
             self._limits.check("max_header_bytes", len(data), f"{self.name}: header bytes")
         elif track.kind is TrackKind.DEPTH:
             data = schemas.depth_data(data, source, self.header.array.width, self.header.array.height)

@@ -49,6 +49,16 @@ HEADER_SCHEMA = json.dumps(
     separators=(",", ":"),
 ).encode()
 
+LAYER_SCHEMA_NAME = "mvcodec.Enhancement"
+
+LAYER_SCHEMA = json.dumps(
+    {
+        "type": "object",
+        "properties": {"format": {"const": "mvcodec-enhancement"}, "views": {"type": "array"}},
+    },
+    separators=(",", ":"),
+).encode()
+
 PREDICTED_FORMAT = "vp9-predicted"
 """What messages of predicted pictures call their codec: no viewer knows it, and none tries to play them."""
 
@@ -134,21 +144,26 @@ def channels(rig: Sequence[RigMessage], videos: Mapping[str, str]) -> list[tuple
     ]
 
 
+_PREDICTED_KINDS = (TrackKind.PREDICTED, TrackKind.ENHANCED)
+
+
 def video_kind(track: Track) -> str:
     """The kind of a video track's messages, a key of PROTOBUF_SCHEMAS."""
-    return "predicted" if track.kind is TrackKind.PREDICTED else "video"
+    return "predicted" if track.kind in _PREDICTED_KINDS else "video"
 
 
 def video_format(track: Track, codec: str) -> str:
     """What the messages of a video track call their codec; `codec` is the header's."""
-    return PREDICTED_FORMAT if track.kind is TrackKind.PREDICTED else foxglove_name(codec)
+    return PREDICTED_FORMAT if track.kind in _PREDICTED_KINDS else foxglove_name(codec)
 
 
 def video_message(packet: Packet, codec: str) -> bytes:
     """A serialised foxglove.CompressedVideo (or mvcodec.PredictedVideo) of a packet."""
     assert packet.track.camera is not None
     form = video_format(packet.track, codec)
-    return compressed_video(frame_id(packet.track.camera), packet.time_ns, packet.data, form)
+    enhanced = packet.track.kind is TrackKind.ENHANCED
+    frame = f"view_{view_name(packet.track.camera)}" if enhanced else frame_id(packet.track.camera)
+    return compressed_video(frame, packet.time_ns, packet.data, form)
 
 
 def compressed_video(frame: str, time_ns: int, data: bytes, form: str) -> bytes:

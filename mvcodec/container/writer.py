@@ -14,6 +14,7 @@ from mvcodec.closing import Closing
 from mvcodec.container import schemas
 from mvcodec.container.chunked_file import CHUNK_MS, ChunkedFile, MessageListener
 from mvcodec.container.declared import METADATA_NAME, TOPICS_KEY
+from mvcodec.enhancement import EnhancementHeader
 from mvcodec.errors import StreamClosed
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, TrackKind
 
@@ -67,6 +68,9 @@ class McapWriter(Closing):
                 file.add(packet.track.topic, packet.index, packet.time_ns, packet.data)
                 for message in self._rig:
                     file.add(message.topic, packet.index, packet.time_ns, message.at(packet.time_ns))
+            elif packet.track.kind is TrackKind.LAYER:
+                self._add_layer_channels(packet)
+                file.add(packet.track.topic, packet.index, packet.time_ns, packet.data)
             else:
                 data = self._message(packet)
                 file.add(packet.track.topic, packet.index, packet.time_ns, data)
@@ -87,6 +91,7 @@ class McapWriter(Closing):
     def _start(self, packets: Sequence[Packet]) -> None:
         first = packets[0]
         header = StreamHeader.from_json(first.data)
+        self._base = header
         self._codec, self._rig = header.codec, schemas.rig_messages(header.array)
         self._size = header.array.width, header.array.height
         self._file.open()
@@ -101,6 +106,16 @@ class McapWriter(Closing):
                 self._file.add_channel(packet.track.topic, *channel)
             return schemas.depth_image(packet, *self._size)
         return schemas.video_message(packet, self._codec)
+
+    def _add_layer_channels(self, packet: Packet) -> None:
+        """The channels of an enhancement layer, with its first header."""
+        if packet.track.topic in self._file.channels:
+            return
+        json_schema = (schemas.LAYER_SCHEMA_NAME, SchemaEncoding.JSONSchema, schemas.LAYER_SCHEMA)
+        self._file.add_channel(packet.track.topic, MessageEncoding.JSON, *json_schema)
+        layer = EnhancementHeader.from_json(packet.data, self._base, packet.track.topic)
+        for channel in schemas.channels((), {each.track.topic: "predicted" for each in layer.views}):
+            self._file.add_channel(*channel)
 
     def _add_channels(self, header: StreamHeader) -> None:
         self._video_topics = tuple(track.topic for track in header.tracks)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from mvcodec.container import McapReader
 from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.decoding.derived_maps import derive_map
+from mvcodec.decoding.enhanced_views import EnhancedViews, WaitingSet
 from mvcodec.decoding.estimated_maps import (
     MapsOnDemand,
     can_be_estimated,
@@ -23,6 +24,7 @@ from mvcodec.decoding.estimated_maps import (
     estimate_maps,
 )
 from mvcodec.decoding.stand_in import fill_absent
+from mvcodec.enhancement import LAYER_TRACK, EnhancementHeader
 from mvcodec.errors import MissingReference, MvCodecWarning, SettingError, StreamClosed, StreamError
 from mvcodec.frames import DecodedSet, DisparityMap, Picture
 from mvcodec.stereo.matcher import Matcher
@@ -53,6 +55,8 @@ class Decoder(Closing):
         limits: what is more than that is refused.
         matcher: estimates the maps of a stream that holds none, by name or one's own; by default the one
             that the stream's settings name. It runs when the first map of a frame set is looked at.
+        enhanced: virtual views that are decoded out of the stream's enhancement layer, if it has them; by
+            default none, None: all. What is decoded is `DecodedSet.enhanced`.
         name: what messages call the stream.
         threads: how many decode at once; by default as set for the process. It changes no picture.
 
@@ -67,6 +71,7 @@ class Decoder(Closing):
         matcher: str | Matcher | None = None,
         name: str = "stream",
         threads: int | None = None,
+        enhanced: Collection[Position] | None = (),
     ) -> None:
         if on_error not in get_args(OnError):
             raise SettingError("on_error", on_error, " or ".join(get_args(OnError)))
@@ -83,6 +88,9 @@ class Decoder(Closing):
         self._frames: slice | None = None
         self._name = name
         self._assembler = Assembler(self._name, _warn)
+        self.enhanced = enhanced
+        self._layer: EnhancedViews | None = None
+        self._waiting: WaitingSet | None = None
 
     @classmethod
     def open(
@@ -93,22 +101,24 @@ class Decoder(Closing):
         limits: Limits = DEFAULT_LIMITS,
         matcher: str | Matcher | None = None,
         threads: int | None = None,
+        enhanced: Collection[Position] | None = (),
     ) -> Decoder:
         """A decoder of a file, pipe or standard input, to iterate over.
 
         Args:
             source: path, URL of a file on a web server, or a binary file that may be a pipe and stays open.
             frames: Python slice over the frame sets that the file holds (from 0), step 1.
-            on_error, limits, matcher, threads: as the constructor's.
+            on_error, limits, matcher, threads, enhanced: as the constructor's.
 
         Raises:
             InputError: the system refuses to open it.
             StreamError: not an MCAP file, none of ours, or one of a newer format version.
             SettingError (on iterating): the slice is empty.
         """
-        decoder = cls(on_error, limits, matcher, threads=threads)
+        decoder = cls(on_error, limits, matcher, threads=threads, enhanced=enhanced)
         try:
-            decoder._reader = McapReader.open(source, limits, _warn if on_error == "skip" else None)
+            on_damage = _warn if on_error == "skip" else None
+            decoder._reader = McapReader.open(source, limits, on_damage, layer=decoder._wants_layer)
             decoder._name = decoder._reader.name
             decoder._assembler = Assembler(decoder._name, _warn)
             decoder._start(decoder._reader.header)
@@ -160,6 +170,8 @@ class Decoder(Closing):
                     yield decoded
         if not self._reader.cut_off and number >= start:
             yield from self._decode_all(self._assembler.flush())
+        if number >= start:
+            yield from self._release()
         if number < start:
             raise SettingError(
                 "frames", f"{start}:", f"less than the {number + 1} frame sets of {self._name}"
@@ -179,6 +191,8 @@ class Decoder(Closing):
             raise StreamClosed("the decoder was flushed; it takes no more packets")
         if packet.track.kind is TrackKind.HEADER:
             return self._push_header(packet)
+        if packet.track.kind in (TrackKind.LAYER, TrackKind.ENHANCED):
+            return self._push_layer(packet)
         known = packet.track in self._decoders or packet.track in self._predicted
         if not known or self._skipping:
             return []
@@ -191,7 +205,7 @@ class Decoder(Closing):
 
     def flush(self) -> list[DecodedSet]:
         """End the stream. Returns what waits for missing packets; `push` is an error from now on."""
-        done = self._decode_all(self._assembler.flush()) if self._open else []
+        done = [*self._decode_all(self._assembler.flush()), *self._release()] if self._open else []
         self._end()
         return done
 
@@ -206,7 +220,7 @@ class Decoder(Closing):
 
     def _push_header(self, packet: Packet) -> list[DecodedSet]:
         """A keyframe begins, where all that was lost is found again."""
-        done = self._decode_all(self._assembler.push(packet))
+        done = [*self._decode_all(self._assembler.push(packet)), *self._release()]
         header = StreamHeader.from_json(packet.data, self._name)
         if header != self._header:
             self._start(header)
@@ -231,10 +245,39 @@ class Decoder(Closing):
                 self._decoders[track] = TrackDecoder(codec, sizes[track.kind])
         self._assembler.start(header.tracks)
         self._absent, self._skipping = frozenset(), False
+        self._layer = None
+
+    @property
+    def _wants_layer(self) -> bool:
+        return self.enhanced is None or bool(self.enhanced)
+
+    def _push_layer(self, packet: Packet) -> list[DecodedSet]:
+        """A packet of the enhancement layer; returns the frame set that it completes."""
+        if not self._wants_layer or self._header is None:
+            return []
+        if packet.track == LAYER_TRACK:
+            layer = EnhancementHeader.from_json(packet.data, self.header, self._assembler.label(packet))
+            if self._layer is None or self._layer.layer != layer:
+                self._layer = EnhancedViews(self.header, layer, self.enhanced, _warn)
+            return []
+        waiting = self._waiting
+        if self._layer is None or waiting is None or packet.index != waiting.decoded.index:
+            return []
+        waiting.packets[packet.track] = packet
+        return self._release() if self._layer.tracks <= waiting.packets.keys() else []
+
+    def _release(self) -> list[DecodedSet]:
+        """The frame set that waits for its enhanced views, with those that came."""
+        waiting, self._waiting = self._waiting, None
+        if waiting is None or self._layer is None:
+            return [] if waiting is None else [waiting.decoded]
+        with workers.threads(self._threads):
+            return [self._layer.finish(waiting, self._assembler.label)]
 
     def _decode_all(self, sets: list[PacketSet]) -> list[DecodedSet]:
         done = []
         for packets in sets:
+            done += self._release()
             try:
                 with workers.threads(self._threads):
                     done += self._decode(packets)
@@ -270,7 +313,11 @@ class Decoder(Closing):
         if reasons:
             pictures, disparities = fill_absent(array, pictures, disparities)
         absent = tuple(camera for camera in array.real if camera in reasons)
-        return [DecodedSet(array, first.index, first.time_ns, pictures, disparities, span, absent)]
+        decoded = DecodedSet(array, first.index, first.time_ns, pictures, disparities, span, absent)
+        if self._layer is None or not self._layer.tracks:
+            return [decoded]
+        self._waiting = WaitingSet(decoded, planes, first, {})
+        return []
 
     def _sent_maps(
         self,

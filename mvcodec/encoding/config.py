@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import InitVar, dataclass, fields
 
-from mvcodec.array import CameraArray
+from mvcodec.array import CameraArray, Position
 from mvcodec.encoding.speed import FOR_FILES, SPEEDS
 from mvcodec.errors import SettingError
 from mvcodec.settings import check_settings, setting
@@ -83,6 +83,11 @@ class EncoderConfig:
         "synthesis: real cameras are coded from each other, for fewer bits; the first one plays alone",
         choices=PREDICTIONS,
     )
+    enhance: int | None = setting(
+        None,
+        "QP of an enhancement layer: views whose originals are there, coded from their synthesis",
+    )
+    enhance_views: tuple[Position, ...] | None = None
     disparity_median: int | None = setting(
         None,
         "smooth maps over N x N before coding, N odd; 0: don't (default: 5, at half size 3)",
@@ -101,8 +106,13 @@ class EncoderConfig:
         if any(value is not None for value in (qp, crf, bitrate_kbps)):
             object.__setattr__(self, "rate", RateControl(qp, crf, bitrate_kbps))
         check_qp("disparity_qp", self.disparity_qp, max_qp)
+        check_qp("enhance", self.enhance, max_qp)
         self.rate.check_scale(max_qp)
         check_settings(self)
+        if self.enhance is not None and self.disparity_cameras == "none":
+            raise SettingError("disparity_cameras", "none", "maps, which an enhancement layer needs")
+        if self.enhance_views is not None and self.enhance is None:
+            raise SettingError("enhance_views", "given", "enhance beside it")
         if self.prediction != "none" and self.disparity_cameras == "none":
             raise SettingError("disparity_cameras", "none", f"maps, which prediction {self.prediction} needs")
         if self.prediction != "none" and self.rate.bitrate_kbps is not None:
@@ -144,7 +154,7 @@ class EncoderConfig:
 
     def cameras_for(self, array: CameraArray) -> str:
         """Which real cameras of an array send a map, as `StreamHeader.disparity_cameras`."""
-        if self.disparity_cameras == AUTO and self.prediction == "none":
+        if self.disparity_cameras == AUTO and self.prediction == "none" and self.enhance is None:
             return best_disparity_cameras(self.quality, self.codec, array)
         given = self.disparity_cameras
         if given is not None and given != AUTO:

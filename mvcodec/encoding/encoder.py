@@ -13,6 +13,7 @@ import mvcodec
 from mvcodec.array import CameraArray, Position
 from mvcodec.depth import depth_mm, warn_behind_infinity
 from mvcodec.encoding.config import EncoderConfig, default_gop, find_matcher, matcher_name
+from mvcodec.encoding.enhancer import Enhancer, enhanced_views
 from mvcodec.encoding.predicted_cameras import PredictedCameras, predicted_quantizer, prediction_order
 from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet, Picture
@@ -87,12 +88,20 @@ class Encoder:
         alone = tuple(camera for camera in array.real if camera not in {each.camera for each in self._order})
         self._encoders = self._make_encoders(TrackKind.TEXTURE, alone, size, rate)
         self._predicted: PredictedCameras | None = None
+        self._enhancer: Enhancer | None = None
+        asked = self.config.enhance_views
+        self._layer_views = () if self.config.enhance is None else enhanced_views(array, asked)
         self._header: StreamHeader | None = None
         self._position = 0  # frame sets since the last keyframe, modulo the GOP
         self._key_ns = 0
         self._last: FrameSet | None = None
         self._maps: Mapping[Position, DisparityMap] = {}
         self._open = True
+
+    @property
+    def views(self) -> tuple[Position, ...]:
+        """The views whose pictures `push` wants: real cameras, and those of the enhancement layer."""
+        return tuple(sorted({*self.array.real, *self._layer_views}))
 
     @property
     def header(self) -> StreamHeader | None:
@@ -116,6 +125,7 @@ class Encoder:
             self._header = self._make_header(frames)
             self._encoders |= self._make_map_encoders(self._header)
             self._predicted = self._make_predicted(self._header)
+            self._enhancer = self._make_enhancer(self._header)
         # Should something fail below, the next frame set starts afresh with a keyframe.
         position, self._position = self._position, 0
         if self._last is not None and frames.time_ns - self._key_ns >= KEYFRAME_NS:
@@ -138,6 +148,9 @@ class Encoder:
             self._key_ns = frames.time_ns
             head = Packet(HEADER_TRACK, frames.index, frames.time_ns, True, self._header.to_json())
             packets.insert(0, head)
+        if self._enhancer is not None:
+            with threads(self.config.threads):
+                packets = self._enhancer.push(packets, frames.pictures)
         if self.config.depth:
             if self._last is None:
                 maps = (found.values_px for found in self._maps.values())
@@ -224,6 +237,12 @@ class Encoder:
         quantizer = predicted_quantizer(self.config.quality, self._codec)
         return PredictedCameras(header, self._codec, quantizer, self.config.chosen_preset)
 
+    def _make_enhancer(self, header: StreamHeader) -> Enhancer | None:
+        if self.config.enhance is None:
+            return None
+        quantizer = predicted_quantizer(self.config.enhance, self._codec)
+        return Enhancer(header, self._layer_views, quantizer, self.config.chosen_preset)
+
     def _make_header(self, frames: FrameSet) -> StreamHeader:
         span = self.config.disparity_range_px
         if span is None:
@@ -257,11 +276,11 @@ class Encoder:
     def _check(self, frames: FrameSet) -> None:
         array = self.array
         where = f"frame {frames.index}"
-        for camera in array.real:
+        for camera in self.views:
             name = f"{where}, view {view_name(camera)}"
             picture = frames.pictures.get(camera)
             if picture is None:
-                raise InputError(name, "no picture", "one of every real camera")
+                raise InputError(name, "no picture", "one of every real camera, and of every view to enhance")
             if picture.shape != (array.height, array.width, 3) or picture.dtype != np.uint8:
                 expected = f"uint8 RGB, {array.width}x{array.height}"
                 raise InputError(name, f"a picture of shape {picture.shape}, {picture.dtype}", expected)

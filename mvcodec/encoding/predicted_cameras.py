@@ -20,7 +20,7 @@ from mvcodec.workers import run_all
 SPEEDS = dict(zip(PRESETS, (8, 7, 6, 5, 4, 3, 1, 1, 0, 0), strict=True))
 """libvpx's cpu-used for the efforts that x264 has names for."""
 
-QUANTIZER_LINE = (2.0, -31.0)
+QUANTIZER_LINE = (2.0, -25.0)
 """(slope, offset): ``slope * qp + offset`` is the quantizer of predicted pictures beside libx264's QP for the
 others. See docs/prediction.md for how it was found."""
 

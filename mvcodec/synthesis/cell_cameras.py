@@ -33,13 +33,17 @@ class CellCameras:
 
 
 def real_view(decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView | None:
-    """A real camera's own picture and map, where the viewpoint is its place.
+    """A real camera's own picture and map, where the viewpoint is its place; or an enhanced view's.
 
     Raises:
         SettingError: the viewpoint lies outside the array.
     """
     decoded.array.cell_at(viewpoint)
     camera = viewpoint.position
+    enhanced = None if camera is None else decoded.enhanced.get(camera)
+    if enhanced is not None:
+        seen_by = np.ones(enhanced.disparity_px.shape, np.uint8)
+        return RenderedView(viewpoint, enhanced.pixels.copy(), enhanced.disparity_px.copy(), seen_by)
     if camera is None or camera not in decoded.pictures:
         return None
     values = decoded.disparities[camera].values_px

@@ -48,15 +48,15 @@ class FramePrediction:
     def predict(self, place: Position, references: Sequence[Position]) -> Planes:
         """The picture of a place, from those of references, which are decoded, as are the maps they need."""
         sources = [self._source(other) for other in references]
-        return predict(self._header.array, sources, place, self._disparity(place))
+        return predict(self._header.array, sources, place, self.disparity(place))
 
     def _source(self, place: Position) -> PredictionSource:
         if place not in self._sources:
-            self._sources[place] = PredictionSource(place, self._planes[place], self._disparity(place))
+            self._sources[place] = PredictionSource(place, self._planes[place], self.disparity(place))
         return self._sources[place]
 
-    def _disparity(self, place: Position) -> IntMap:
-        """The map of a place: its own, or made from those around it."""
+    def disparity(self, place: Position) -> IntMap:
+        """The map of a place, 64ths of a pixel: its own, or made from those around it."""
         if place not in self._maps:
             header = self._header
             around, span = header.maps_around(place), header.disparity_range_px
@@ -65,6 +65,6 @@ class FramePrediction:
                 luma = self._edges[place].y if place in self._edges else np.zeros_like(some)
                 self._maps[place] = full_map(self._codes[place], luma, span, header.disparity_scale)
             else:
-                maps = {camera: self._disparity(camera) for camera in around}
+                maps = {camera: self.disparity(camera) for camera in around}
                 self._maps[place] = predicted_disparity(header.array, maps, place, span)
         return self._maps[place]

@@ -1,0 +1,106 @@
+"""Codes virtual views from their synthesis: the enhancement layer."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from mvcodec.array import CameraArray, Position, Viewpoint
+from mvcodec.encoding.predicted_cameras import SPEEDS
+from mvcodec.enhancement import LAYER_TRACK, EnhancedView, EnhancementHeader
+from mvcodec.errors import SettingError
+from mvcodec.frames import Picture
+from mvcodec.stream import Packet, StreamHeader
+from mvcodec.synthesis.frame_prediction import FramePrediction
+from mvcodec.synthesis.track_decoding import StreamTracks
+from mvcodec.video.codec import Planes
+from mvcodec.video.colour import even_size, to_planes
+from mvcodec.video.vp9_reference import (
+    ReferenceSettings,
+    Vp9ReferenceDecoder,
+    Vp9ReferenceEncoder,
+)
+from mvcodec.workers import run_all
+
+
+def enhanced_views(array: CameraArray, asked: Collection[Position] | None) -> tuple[Position, ...]:
+    """The views of a layer, in row order: those asked for, by default every virtual one.
+
+    Raises:
+        SettingError: a view is real, is not of the grid, or there is none.
+    """
+    virtual = [view for view in array.positions if view not in array.real]
+    if asked is None:
+        asked = virtual
+    for view in asked:
+        if view not in virtual:
+            expected = f"views of the {array.rows} x {array.cols} grid that no real camera has"
+            raise SettingError("enhance_views", f"{view[0]},{view[1]}", expected)
+    if not asked:
+        raise SettingError("enhance_views", "none", "one virtual view at least")
+    return tuple(view for view in virtual if view in set(asked))
+
+
+def layer_order(array: CameraArray, views: Sequence[Position]) -> tuple[EnhancedView, ...]:
+    """Each view from the real cameras of its cell."""
+    return tuple(EnhancedView(view, array.cell_at(Viewpoint(*view)).cameras) for view in views)
+
+
+class Enhancer:
+    """Codes the layer of a stream. The base is decoded here, as decoders do.
+
+    Args:
+        header: the base's.
+        views: virtual ones.
+        quantizer: 0..63.
+        preset: effort, one of PRESETS.
+
+    Raises:
+        LibvpxMissing: there is no libvpx.
+    """
+
+    def __init__(self, header: StreamHeader, views: Sequence[Position], quantizer: int, preset: str) -> None:
+        size = even_size(header.array.width, header.array.height)
+        self._coding = ReferenceSettings(*size, quantizer, speed=SPEEDS[preset])
+        self._order = layer_order(header.array, views)
+        self.header = EnhancementHeader(self._order, {"quantizer": quantizer, "speed": SPEEDS[preset]})
+        self._base_header, self._base = header, StreamTracks(header)
+        self._encoders = {each.view: Vp9ReferenceEncoder(self._coding) for each in self._order}
+        sources = {other for each in self._order for other in each.references}
+        self._mirrors = {each.view: Vp9ReferenceDecoder(size) for each in self._order if each.view in sources}
+
+    def push(self, base: Sequence[Packet], pictures: Mapping[Position, Picture]) -> list[Packet]:
+        """Code the layer of one frame set.
+
+        Args:
+            base: its packets, the header's first at a keyframe.
+            pictures: uint8 (H, W, 3) RGB of the layer's views, at least.
+
+        Returns:
+            The base's packets, at a keyframe the layer's header behind the base's, and behind all one packet
+            for each view.
+        """
+        keyframe = base[0].keyframe
+        frame = FramePrediction(self._base_header, self._base.decode(base))
+        index, time_ns = base[0].index, base[0].time_ns
+        packets = list(base)
+        if keyframe:
+            packets.insert(1, Packet(LAYER_TRACK, index, time_ns, True, self.header.to_json()))
+        waiting = list(self._order)
+        while waiting:
+            # Views whose references are there are coded side by side.
+            ready = [each for each in waiting if not {w.view for w in waiting} & set(each.references)]
+            predictions = [[frame.predict(each.view, each.references)] for each in ready]
+            originals = [to_planes(pictures[each.view]) for each in ready]
+            units = run_all(
+                self._code, [each.view for each in ready], originals, predictions, [keyframe] * len(ready)
+            )
+            for each, unit, prediction in zip(ready, units, predictions, strict=True):
+                packets.append(Packet(each.track, index, time_ns, keyframe, unit))
+                if each.view in self._mirrors:
+                    mirror = self._mirrors[each.view]
+                    frame.add(each.view, mirror.push(unit, prediction, keyframe, each.track.topic))
+            waiting = [each for each in waiting if each not in ready]
+        return packets
+
+    def _code(self, view: Position, original: Planes, prediction: list[Planes], keyframe: bool) -> bytes:
+        return self._encoders[view].push(original, prediction, keyframe)

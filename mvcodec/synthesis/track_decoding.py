@@ -1,0 +1,51 @@
+"""Every track of a stream back to planes, strictly: what encoders mirror, and what files are held against."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+
+from mvcodec.stream import Packet, StreamHeader, Track
+from mvcodec.synthesis.frame_prediction import FramePrediction
+from mvcodec.video.codec import Planes
+from mvcodec.video.codecs import find_codec
+from mvcodec.video.map_size import track_sizes
+from mvcodec.video.track import PredictedTrackDecoder
+from mvcodec.workers import run_all
+
+
+class StreamTracks:
+    """Decodes the frame sets of a stream in order, none left out.
+
+    Args:
+        header: the stream's.
+    """
+
+    def __init__(self, header: StreamHeader) -> None:
+        codec = find_codec(header.codec)
+        sizes = track_sizes(header.array.width, header.array.height, header.disparity_scale)
+        self._header = header
+        self._predicted = {header.picture_track(each.camera): each for each in header.predicted}
+        self._alone = {track: codec.decoder() for track in header.tracks if track not in self._predicted}
+        self._others = {track: PredictedTrackDecoder(sizes[track.kind]) for track in self._predicted}
+
+    def decode(self, packets: Iterable[Packet]) -> dict[Track, Planes]:
+        """The planes of one frame set, in the order of the tracks; packets of other tracks are ignored."""
+        by_track = {packet.track: packet for packet in packets}
+        found = dict(zip(self._alone, run_all(self._decode, [by_track[t] for t in self._alone]), strict=True))
+        frame = FramePrediction(self._header, found)
+        for track, each in self._predicted.items():
+            make = partial(_one, frame, each.camera, each.references)
+            found[track] = self._others[track].push(by_track[track], track.topic, make)
+            frame.add(each.camera, found[track])
+        return {track: found[track] for track in self._header.tracks}
+
+    def _decode(self, packet: Packet) -> Planes:
+        (planes,) = self._alone[packet.track].push(packet.data, packet.track.topic)
+        return planes
+
+
+def _one(
+    frame: FramePrediction, place: tuple[int, int], references: Iterable[tuple[int, int]]
+) -> list[Planes]:
+    return [frame.predict(place, tuple(references))]
