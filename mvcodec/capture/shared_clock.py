@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mvcodec.array import Position
 from mvcodec.capture.pairing import Pairing, pair_pictures
+from mvcodec.capture.sync_views import synchronised
 from mvcodec.capture.timing import Timing, rate_of_times
 from mvcodec.capture.view_array import ViewReader
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
@@ -66,6 +67,10 @@ def common_times(
             own = tuple(round((stated.first_frame + n) * 1e9 / fps) for n in range(reader.count))
         shift = offsets.get(view, 0)
         times[view] = tuple(time + shift for time in own) if shift else own
+    if timing.sync is not None and len(views) > 1:
+        for view, shift in synchronised(views, times, _labels(views), timing.sync).items():
+            if view not in offsets:
+                times[view] = tuple(time + shift for time in times[view])
     pairing = pair_pictures(times, _labels(views), timing.tolerance_ms)
     if not pairing.times_ns:
         raise InputError(name, f"no pictures of all cameras at one time ({'; '.join(pairing.notes)})", "some")

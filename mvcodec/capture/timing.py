@@ -11,6 +11,8 @@ from mvcodec.array import MAX_FPS, MIN_FPS
 from mvcodec.capture.pairing import typical_step_ns
 from mvcodec.errors import SettingError
 
+SYNCS = ("motion", "audio")
+
 _STANDARD_RATES = tuple(
     Fraction(rate * 1000, divisor)
     for rate in (12, 15, 24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
@@ -26,6 +28,7 @@ class Timing:
     Attributes:
         fps: pictures a second of files that have no times of their own, and the nominal frame rate.
         offsets_ms: what is added to the times of a camera's pictures, by its file's name or place.
+        sync: what estimates the other offsets: ``motion`` in the pictures, or ``audio``; None: nothing.
         tolerance_ms: how far apart the pictures of one frame set may be taken; None: see `pair_pictures`.
 
     Raises:
@@ -35,10 +38,13 @@ class Timing:
     fps: float | None = None
     offsets_ms: Mapping[str, float] = field(default_factory=dict)
     tolerance_ms: float | None = None
+    sync: str | None = None
 
     def __post_init__(self) -> None:
         if self.fps is not None and not MIN_FPS <= self.fps <= MAX_FPS:
             raise SettingError("fps", self.fps, f"{MIN_FPS:g}..{MAX_FPS:g}")
+        if self.sync not in (None, *SYNCS):
+            raise SettingError("sync", self.sync, " or ".join(SYNCS))
         for camera, offset in self.offsets_ms.items():
             if not math.isfinite(offset):
                 raise SettingError("offsets_ms", f"{camera}={offset}", "CAMERA=MS, a number of milliseconds")

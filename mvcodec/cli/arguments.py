@@ -56,6 +56,7 @@ OPTIONS = {
     "seed": "--seed",
     "size": "--size",
     "split": "--split",
+    "sync": "--sync",
     "style": "--style",
     "tolerance_ms": "--tolerance-ms",
     "topics": "--topics",

@@ -141,6 +141,8 @@ def _run(
 def _opened(arguments: argparse.Namespace) -> Iterator[Recording]:
     if arguments.split is not None:
         raise SettingError("split", "with a recording", "an input of video or picture files")
+    if arguments.sync is not None:
+        raise SettingError("sync", f"{arguments.sync} with a recording", "an input of video or picture files")
     timing = timing_of(arguments)
     settings = RecordingSettings(
         topics=_topic_grid(arguments),

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import math
 
-from mvcodec.capture.timing import Timing
+from mvcodec.capture.timing import SYNCS, Timing
 
 
 def add_time_options(parser: argparse.ArgumentParser) -> None:
-    """``--fps``, ``--offset`` and ``--tolerance-ms``."""
+    """``--fps``, ``--offset``, ``--sync`` and ``--tolerance-ms``."""
     group = parser.add_argument_group("time")
     group.add_argument(
         "--fps",
@@ -26,11 +26,15 @@ def add_time_options(parser: argparse.ArgumentParser) -> None:
         help="what to add to the times of a camera (rNN_cNN, its file or topic), ms; repeatable",
     )
     group.add_argument(
+        "--sync",
+        choices=SYNCS,
+        help="estimate the offsets of files from what moves in their pictures, or from their sound tracks",
+    )
+    group.add_argument(
         "--tolerance-ms",
         type=float,
         metavar="N",
-        help="how far apart pictures of one frame set may be taken (default: half of a frame's time,"
-        " of recordings a quarter)",
+        help="how far apart pictures of one frame set may be taken (default: half of a frame's time)",
     )
 
 
@@ -40,7 +44,7 @@ def timing_of(arguments: argparse.Namespace) -> Timing:
     Raises:
         SettingError: a number is out of range.
     """
-    return Timing(arguments.fps, dict(arguments.offset), arguments.tolerance_ms)
+    return Timing(arguments.fps, dict(arguments.offset), arguments.tolerance_ms, arguments.sync)
 
 
 def _offset(text: str) -> tuple[str, float]:
