@@ -49,7 +49,7 @@ def test_demo_leaves_file_pictures_and_table(array: Path, tmp_path: Path) -> Non
         assert read_picture(out / name).any()
     assert (out / "mosaic.mp4").stat().st_size > 0
     assert read_picture(out / "first_view.png").shape == (HEIGHT, WIDTH, 3)
-    assert done.stdout.index("first_view.png") < done.stdout.index("synthesising")
+    assert done.stdout.index("first_view.png") < done.stdout.index("synthesising 9 views")
     for line, name in zip(done.stdout.splitlines()[-2:], ("play", "render"), strict=True):
         program, command, *rest = shlex.split(line)
         assert (ROOT / program).is_file()
