@@ -5,7 +5,7 @@
 # make benchmark  quality and speed on DATA=folder (an array folder or a folder of them)
 # make fuzz       damaged input to everything that reads files, SECONDS=120 for each of five readers (Linux on x86-64)
 # make lint       ruff, mypy, import-linter, and the TypeScript of web/
-# make web        the page of the player that needs no server, from web/ into mvcodec/player/web/
+# make web        the page of the player that needs no server, from web/ into mvcodec/web_player/dist/
 #
 # Each sets .venv up first where it is missing or older than pyproject.toml.
 

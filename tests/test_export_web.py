@@ -11,6 +11,8 @@ from command_line import fails, succeeds
 from playwright.sync_api import Page
 from web_fixtures import Site, pixels_of, serve_folder
 
+import mvcodec
+
 SAMPLE = Path(__file__).parents[1] / "samples" / "room_2x2.mcap"
 pytest_plugins = ("web_fixtures",)
 in_browser = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
@@ -86,3 +88,23 @@ def test_a_server_without_ranges_will_do(tab: Page, site: Site) -> None:
     }""")
     site.has_ranges = True
     assert count > 1
+
+
+@in_browser
+def test_a_notebook_shows_the_player(tab: Page, site: Site) -> None:
+    with mvcodec.open(SAMPLE) as video:
+        shown = video._repr_html_()
+    site.put("notebook.html", f"<!doctype html><meta charset='utf-8'>{shown}".encode())
+    tab.goto(f"{site.url}/notebook.html")
+    player = tab.frame_locator("iframe").locator("mvcodec-player")
+    width = player.evaluate("""async (player) => {
+        await customElements.whenDefined("mvcodec-player");
+        await player.ready;
+        return player.pixels().width;
+    }""")
+    assert width == video.array.width
+
+
+def test_a_notebook_that_cannot_hold_it_says_so() -> None:
+    with SAMPLE.open("rb") as file, mvcodec.open(file) as video:
+        assert "mvcodec.open(path)" in video._repr_html_()

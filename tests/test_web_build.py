@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 ROOM = ROOT / "web"
-BUILT = ROOT / "mvcodec" / "player" / "web"
+BUILT = ROOT / "mvcodec" / "web_player" / "dist"
 SOURCES = ("build.mjs", "package.json", "package-lock.json", "tsconfig.json", "src")
 """As in build.mjs."""
 

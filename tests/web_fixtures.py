@@ -17,7 +17,7 @@ from browser_page import ARGUMENTS, CHROMIUM
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from mvcodec.frames import Picture
-from mvcodec.player.web_page import page_files
+from mvcodec.web_player.pages import page_files
 
 
 @dataclass

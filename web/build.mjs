@@ -6,7 +6,7 @@ import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
 
 const ROOM = dirname(fileURLToPath(import.meta.url));
-const PAGE = join(ROOM, "..", "mvcodec", "player", "web");
+const PAGE = join(ROOM, "..", "mvcodec", "web_player", "dist");
 const TESTS = join(ROOM, "..", "build", "web-tests");
 
 /** What the page is built from: the same list that `tests/test_web_build.py` looks at. */

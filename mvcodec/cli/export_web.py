@@ -20,8 +20,8 @@ from mvcodec.container.reader import McapReader
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import InputError, OutputError, SettingError
 from mvcodec.output.atomic import replacing, write_bytes
-from mvcodec.player.web_page import linked_page, page_files, single_page
 from mvcodec.synthesis.synthesizers import make_synthesizer
+from mvcodec.web_player.pages import linked_page, page_files, single_page
 
 RECORDING, POSTER = "video.mcap", "poster.jpg"
 POSTER_QUALITY = 85

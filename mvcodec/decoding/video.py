@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import os
 import sys
 import threading
@@ -15,6 +16,7 @@ from typing import BinaryIO, overload
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.closing import Closing
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.container.remote import is_url
 from mvcodec.container.shared_file import SharedFile
 from mvcodec.decoding.decoder import Decoder, OnError
 from mvcodec.decoding.frame_store import CACHE_BYTES, FrameStore
@@ -25,8 +27,12 @@ from mvcodec.stream import StreamHeader
 from mvcodec.synthesis.provenance import Provenance
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.synthesizers import DEFAULT_SYNTHESIZER, make_synthesizer
+from mvcodec.web_player.pages import shown_in_frame, single_page
 
 STANDARD_INPUT = "-"
+NOTEBOOK_BYTES = 64 << 20
+"""A notebook keeps what its cells show: larger files are not put into it."""
+
 KEPT_VIEWS = 4
 """Rendered views that are kept, so that a picture, its disparity and its provenance cost one rendering."""
 
@@ -229,6 +235,19 @@ class Video(Closing):
         """Where the pixels of `view` come from: ``seen_by``, uint8 (H, W), how many real cameras saw each one
         (0: filled), and ``layers``, its depth layers."""
         return Provenance.of(self.view(row, col, frame=frame, synthesizer=synthesizer))
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the player, with the file in it or behind its address."""
+        source = self._source if self._store is not None else None
+        if isinstance(source, str) and is_url(source):
+            return shown_in_frame(single_page(self._name, source))
+        if not isinstance(source, str | Path):
+            return html.escape(f"{self._name}: no file on disk; mvcodec.open(path) shows a player")
+        size = Path(source).stat().st_size
+        if size > NOTEBOOK_BYTES:
+            text = f"{self._name}: {size} bytes, too many for a notebook; mvcodec play {self._name} shows it"
+            return html.escape(text)
+        return shown_in_frame(single_page(self._name, Path(source).read_bytes()))
 
     def close(self) -> None:
         """Let go of the file. A binary file that was given stays open."""

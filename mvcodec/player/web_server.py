@@ -14,7 +14,7 @@ from starlette.types import ASGIApp
 
 from mvcodec.player.access import AccessRules
 from mvcodec.player.server import Guard
-from mvcodec.player.web_page import TYPES, content_policy, page_files
+from mvcodec.web_player.pages import TYPES, content_policy, page_files
 
 RECORDING = "video.mcap"
 

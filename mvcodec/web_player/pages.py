@@ -26,7 +26,7 @@ _HEAD = '<meta charset="utf-8">'
 
 def page_files() -> dict[str, bytes]:
     """Name -> content of the built page's files, `index.html` among them."""
-    folder = files("mvcodec.player").joinpath("web")
+    folder = files("mvcodec.web_player").joinpath("dist")
     names = sorted(item.name for item in folder.iterdir() if item.name[item.name.rfind(".") :] in TYPES)
     return {name: folder.joinpath(name).read_bytes() for name in names}
 
@@ -49,27 +49,29 @@ def linked_page(title: str, source: str, poster: str | None) -> str:
     return _filled(title, policy, _element(src=source, poster=poster))
 
 
-def single_page(title: str, recording: bytes, poster: str | None) -> str:
+def single_page(title: str, recording: bytes | str, poster: str | None = None) -> str:
     """One HTML file with everything in it, which opens from disk.
 
     Args:
-        recording: the MCAP file's bytes.
+        recording: the MCAP file's bytes, or its address.
         poster: a data URL.
     """
     page = page_files()
     script, style = page["player.js"].decode(), page["page.css"].decode()
     policy = content_policy(f"'{_digest(script)}'", f"'{_digest(style)}'", "* blob: data:")
-    text = _filled(title, policy, _element(poster=poster))
-    data = base64.b64encode(recording).decode()
+    source = recording if isinstance(recording, str) else None
+    text = _filled(title, policy, _element(src=source, poster=poster))
+    embedded = ""
+    if isinstance(recording, bytes):
+        data = base64.b64encode(recording).decode()
+        embedded = f'<script type="text/plain" id="recording">{data}</script>\n'
     # The script stands last, so that what it looks for is there.
     text = text.replace(_SCRIPT, "").replace(_STYLE, f"<style>{style}</style>")
-    tail = (
-        f'<script type="text/plain" id="recording">{data}</script>\n<script type="module">{script}</script>\n'
-    )
+    tail = f'{embedded}<script type="module">{script}</script>\n'
     return text.replace("</body>", f"{tail}</body>")
 
 
-def shown_in_frame(page: str, height_px: int) -> str:
+def shown_in_frame(page: str, height_px: int = 480) -> str:
     """HTML that shows a page inside another one, as notebooks do."""
     return (
         f'<iframe srcdoc="{html.escape(page)}" allow="fullscreen; xr-spatial-tracking" '
