@@ -57,8 +57,15 @@ def test_a_file_that_is_none_of_ours_leaves_nothing(tmp_path: Path) -> None:
 def test_the_folder_of_the_file_itself_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "video.mcap"
     file.write_bytes(SAMPLE.read_bytes())
-    fails(2, "export-web", file, tmp_path)
+    assert "holds video.mcap already" in fails(1, "export-web", file, tmp_path)
+    fails(2, "export-web", file, tmp_path, "-y")
     assert file.read_bytes() == SAMPLE.read_bytes()
+
+
+def test_a_folder_of_other_things_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    assert "notes.txt" in fails(1, "export-web", SAMPLE, tmp_path, "-y")
+    assert tree(tmp_path) == {"notes.txt"}
 
 
 @in_browser

@@ -12,18 +12,21 @@ from PIL import Image
 
 from mvcodec.array import Viewpoint
 from mvcodec.cli.arguments import add_output_options
-from mvcodec.cli.paths import local_path
+from mvcodec.cli.paths import add_overwrite, check_folder_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, limits_of
 from mvcodec.container.limits import Limits
 from mvcodec.container.reader import McapReader
 from mvcodec.decoding.decoder import Decoder
-from mvcodec.errors import InputError, OutputError, SettingError
+from mvcodec.errors import InputError, SettingError
 from mvcodec.output.atomic import replacing, write_bytes
 from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.web_player.pages import linked_page, page_files, single_page
 
 RECORDING, POSTER = "video.mcap", "poster.jpg"
+PAGE_NAMES = r"index\.html|page\.css|player\.js|licences\.txt|video\.mcap|poster\.jpg"
+"""What a page is made of, which may be overwritten."""
+
 POSTER_QUALITY = 85
 POSTER_SYNTHESIZER = "quick"
 
@@ -44,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--title", metavar="T", help="of the page (default: the file's name)")
     parser.add_argument("--poster", action="store_true", help="show a picture while the file is loaded")
+    add_overwrite(parser)
     add_limits(parser)
     add_output_options(parser)
 
@@ -53,8 +57,7 @@ def run(arguments: argparse.Namespace) -> None:
     source: Path = arguments.input
     folder: Path = arguments.output
     limits = limits_of(arguments)
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(folder, "it is a file")
+    check_folder_target(folder, PAGE_NAMES, overwrite=arguments.overwrite)
     if (folder / RECORDING).resolve() == source.resolve():
         raise SettingError("OUTDIR", folder, "another folder than the file's")
     with McapReader.open(source, limits):  # what is no file of ours is told before anything is written
