@@ -18,6 +18,7 @@ from plane_scene import Plane, PlaneScene
 from small_arrays import write_array
 
 from mvcodec.array import CameraArray, Position, Viewpoint
+from mvcodec.conformance.recovery import recover
 from mvcodec.conformance.validation import validate
 from mvcodec.container import McapReader, McapWriter
 from mvcodec.decoding.decoder import Decoder
@@ -177,6 +178,17 @@ def test_files_with_a_layer_are_clean_for_who_does_not_know_it(
         kinds = {packet.track.kind for _, packet in reader.packets()}
     assert kinds == {TrackKind.HEADER, TrackKind.TEXTURE, TrackKind.DISPARITY}
     assert json.loads(coded[0][0].data)["version"] == 1
+
+
+def test_recover_keeps_the_layer(coded: list[list[Packet]], tmp_path: Path) -> None:
+    file, new = written(coded), tmp_path / "new.mcap"
+    result = recover(io.BytesIO(file), new, lambda _: None)
+    assert (result.frames, result.incomplete) == (4, 0)
+    for one, other in zip(decoded(file), decoded(new.read_bytes()), strict=True):
+        np.testing.assert_array_equal(one.enhanced[1, 1].pixels, other.enhanced[1, 1].pixels)
+    with pytest.warns(MvCodecWarning, match="cut off"):
+        result = recover(io.BytesIO(file[: len(file) * 3 // 4]), new, lambda _: None)
+    assert all((1, 1) in each.enhanced for each in decoded(new.read_bytes()))
 
 
 def test_layer_headers_that_cannot_be_are_refused(coded: list[list[Packet]]) -> None:

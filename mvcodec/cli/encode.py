@@ -21,6 +21,7 @@ from mvcodec.cli.encode_stream import (
     encode_stream,
     is_stream,
     open_target,
+    own_file,
     refuse_stream_options,
 )
 from mvcodec.cli.info import document, simulcast_bits, summary
@@ -36,6 +37,7 @@ from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD
 from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.cli.time_options import add_time_options, timing_of
 from mvcodec.container import McapWriter, StreamInfo, read_info
+from mvcodec.decoding.decoded_source import DecodedSource
 from mvcodec.depth import require_calibration
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.speed import FOR_LIVE
@@ -133,13 +135,7 @@ def _check_effect(arguments: argparse.Namespace) -> None:
 
 
 def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
-    source = open_input(
-        arguments.input,
-        grid=arguments.grid,
-        real=arguments.real,
-        timing=timing_of(arguments),
-        reading=reading_of(arguments),
-    )
+    source = _open(arguments)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     array = source.array
     if arguments.calibration is not None:
@@ -155,12 +151,32 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
     if source.has_given and not given:
         text = f"{source.name}: it has disparity or depth of its own, which --matcher {GIVEN} codes"
         warnings.warn(text, MvCodecWarning, stacklevel=2)
-    range_px = find_range(source, chosen, arguments.disparity_range, given)
+    range_px = (
+        source.disparity_range_px
+        if isinstance(source, DecodedSource) and arguments.disparity_range is None
+        else find_range(source, chosen, arguments.disparity_range, given)
+    )
     if arguments.dry_run:
         print(plan(array, config, chosen, range_px))
         return None
     with live_view(arguments) as view:
         return _encode(source, array, chosen, replace(config, disparity_range_px=range_px), arguments, view)
+
+
+def _open(arguments: argparse.Namespace) -> ArraySource:
+    path = own_file(arguments)
+    if path is None:
+        return open_input(
+            arguments.input,
+            grid=arguments.grid,
+            real=arguments.real,
+            timing=timing_of(arguments),
+            reading=reading_of(arguments),
+        )
+    for option, found, default in (("--grid", arguments.grid, None), ("--real", arguments.real, "corners")):
+        if found != default:
+            raise SettingError(option, found, f"no such option: {path} has its own")
+    return DecodedSource(path)
 
 
 def _encode(

@@ -26,6 +26,7 @@ from mvcodec.container import McapWriter
 from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.container.recorded_pictures import Clock
+from mvcodec.decoding.decoded_source import is_own_file
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.live import LiveEncoding, WhenBehind
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
@@ -65,9 +66,18 @@ def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def is_stream(arguments: argparse.Namespace) -> bool:
-    """Whether the input is a recording (in one file or several) or a stream."""
+def own_file(arguments: argparse.Namespace) -> Path | None:
+    """The input, if it is a file of ours that is coded again."""
     inputs: list[Path] = arguments.input
+    asked = len(inputs) == 1 and arguments.topics is None and inputs[0].suffix.lower() == SUFFIX
+    return inputs[0] if asked and is_own_file(inputs[0]) else None
+
+
+def is_stream(arguments: argparse.Namespace) -> bool:
+    """Whether the input is a recording (in one file or several) or a stream; files of ours are neither."""
+    inputs: list[Path] = arguments.input
+    if own_file(arguments) is not None:
+        return False
     return [str(path) for path in inputs] == [STANDARD] or all(
         path.suffix.lower() == SUFFIX for path in inputs
     )

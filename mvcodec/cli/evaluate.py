@@ -16,6 +16,7 @@ from mvcodec.capture import open_input, resolve_frames
 from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, positive_int
 from mvcodec.cli.cluster_options import add_cluster, place
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
+from mvcodec.cli.layer_options import add_layer, layer_settings
 from mvcodec.cli.progress import progress
 from mvcodec.cluster.connection import connected
 from mvcodec.cluster.places import Place
@@ -61,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"codecs of the anchors, some of {', '.join(CODECS)} (default: {', '.join(ANCHOR_CODECS)})",
     )
     add_coding(parser)
+    add_layer(parser)
     add_synthesizer(parser)
     parser.add_argument(
         "--jobs",
@@ -158,7 +160,7 @@ def _study(array: CameraArray, arguments: argparse.Namespace, range_px: tuple[fl
     from mvcodec.evaluation.study import Study, translate_qps
 
     make_synthesizer(arguments.synthesizer)  # a wrong name is told before anything is measured
-    config = checked_config(array, arguments, disparity_range_px=range_px)
+    config = checked_config(array, arguments, disparity_range_px=range_px, **layer_settings(arguments))
     return Study(
         qps=arguments.qp or translate_qps(DEFAULT_QPS, "h264", arguments.codec),
         config=config,

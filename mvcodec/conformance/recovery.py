@@ -12,8 +12,9 @@ from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.decoding.estimated_maps import can_be_estimated
+from mvcodec.enhancement import LAYER_TRACK
 from mvcodec.errors import SettingError, StreamError
-from mvcodec.stream import Packet, StreamHeader, Track, TrackKind
+from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind
 from mvcodec.video.codecs import CODECS
 from mvcodec.video.map_size import track_sizes
 from mvcodec.video.reference_watch import ReferenceWatch
@@ -65,7 +66,10 @@ def recover(
     """
     if incomplete not in get_args(Incomplete):
         raise SettingError("incomplete", incomplete, " or ".join(get_args(Incomplete)))
-    with McapReader.open(source, limits, tell, depth=True) as reader, McapWriter(target) as writer:
+    with (
+        McapReader.open(source, limits, tell, depth=True, layer=True) as reader,
+        McapWriter(target) as writer,
+    ):
         assembler = Assembler(reader.name, tell)
         assembler.start(reader.header.tracks)
         tracks = _Tracks(reader.header, reader.name)
@@ -73,6 +77,8 @@ def recover(
         for _, packet in reader.packets():
             if packet.track.kind is TrackKind.DEPTH:
                 copier.add_depth(packet)
+            elif packet.track.kind in (TrackKind.LAYER, TrackKind.ENHANCED):
+                copier.add_layer(packet)
             else:
                 copier.push(assembler.push(packet))
         if not reader.cut_off:
@@ -145,6 +151,8 @@ class _Copier:
         self._held: list[Packet] = []
         self._depth: dict[int, dict[Track, Packet]] = {}
         self._depth_tracks: set[Track] = set()
+        self._layer: dict[int, dict[Track, Packet]] = {}
+        self._has_layer = False
         self._absent: set[Track] = set()
         self._waits = True
         self.incomplete = self.dropped = 0
@@ -161,6 +169,21 @@ class _Copier:
             if len(self._depth) > _HELD_DEPTHS:
                 del self._depth[min(self._depth)]
 
+    def add_layer(self, packet: Packet) -> None:
+        """Take a packet of the enhancement layer, which goes with its frame set's pictures."""
+        if self._last is None or packet.index >= self._last.index:
+            self._layer.setdefault(packet.index, {}).setdefault(packet.track, packet)
+            if len(self._layer) > _HELD_DEPTHS:
+                del self._layer[min(self._layer)]
+
+    def _with_layer(self, held: list[Packet]) -> list[Packet]:
+        """A frame set with what there is of its layer, from the layer's first header on."""
+        layer = self._layer.pop(held[0].index, {})
+        head = layer.pop(LAYER_TRACK, None)
+        if head is not None and held[0].track == HEADER_TRACK:
+            held, self._has_layer = [held[0], head, *held[1:]], True
+        return [*held, *layer.values()] if self._has_layer else held
+
     def flush(self) -> None:
         """Write the frame set that waits for its depth."""
         if not self._held:
@@ -172,7 +195,9 @@ class _Copier:
         there = {packet.track for packet in self._held} | depth.keys()
         self._tell_absent(tracks - there, first)
         self.incomplete += not tracks <= there
-        self._writer.push([*self._held, *sorted(depth.values(), key=lambda packet: packet.track.topic)])
+        self._writer.push(
+            [*self._with_layer(self._held), *sorted(depth.values(), key=lambda packet: packet.track.topic)]
+        )
         self._held = []
 
     def _push(self, found: PacketSet) -> None:

@@ -75,7 +75,7 @@ def encode_into(
 ) -> None:
     """Code the chosen frames into a file; the clock runs while the encoder works."""
     with McapWriter(path) as writer, Encoder(source.array, config, matcher) as encoder:
-        for frame_set in source.frame_sets(slice(chosen.start, chosen.stop)):
+        for frame_set in source.frame_sets(slice(chosen.start, chosen.stop), encoder.views):
             with clock:
                 packets = encoder.push(frame_set)
             writer.push(packets)
@@ -87,7 +87,7 @@ def decode_view(
     """The original and the decoded picture of a view in the chosen frame of that number (from 0)."""
     frame = chosen[number]
     (originals,) = source.frame_sets(slice(frame, frame + 1), [view])
-    with Decoder.open(file, slice(number, number + 1)) as decoder:
+    with Decoder.open(file, slice(number, number + 1), enhanced=None) as decoder:
         (decoded,) = decoder
     return originals.pictures[view], synthesizer.render(decoded, Viewpoint(*view)).pixels
 
@@ -103,7 +103,7 @@ def _measure(
     positions = source.array.positions
     meter = QualityMeter(source.array.real)
     originals = source.frame_sets(slice(chosen.start, chosen.stop), positions)
-    with Decoder.open(file) as decoder:
+    with Decoder.open(file, enhanced=None) as decoder:
         decoded_sets = iter(decoder)
         for frame_set in originals:
             with clock:
