@@ -53,8 +53,12 @@ def test_every_camera_comes_back(shape: tuple[int, int], maps: str) -> None:
             assert quality > 34, (camera, quality)
 
 
-def test_odd_sizes_and_small_maps_come_back() -> None:
-    array = make_array(95, 63)
+@pytest.mark.parametrize("size", [(95, 63), (90, 52)])
+def test_odd_sizes_and_small_maps_come_back(size: tuple[int, int], tmp_path: Path) -> None:
+    array = make_array(*size)
+    path = tmp_path / "x.mcap"
+    path.write_bytes(predicted_file(array, disparity_scale=2, qp=24))
+    assert validate(path) == []
     for decoded in decoded_sets(predicted_file(array, disparity_scale=2, qp=24)):
         for camera in array.real:
             original = frame_set(array, decoded.index).pictures[camera]

@@ -240,7 +240,7 @@ class Decoder(Closing):
         self._decoders, self._predicted = {}, {}
         for track in header.tracks:
             if track.kind is TrackKind.PREDICTED:
-                self._predicted[track] = PredictedTrackDecoder(sizes[track.kind])
+                self._predicted[track] = PredictedTrackDecoder(sizes[TrackKind.TEXTURE])
             else:
                 self._decoders[track] = TrackDecoder(codec, sizes[track.kind])
         self._assembler.start(header.tracks)

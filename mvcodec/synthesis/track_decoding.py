@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 
-from mvcodec.stream import Packet, StreamHeader, Track
+from mvcodec.stream import Packet, StreamHeader, Track, TrackKind
 from mvcodec.synthesis.frame_prediction import FramePrediction
 from mvcodec.video.codec import Planes
 from mvcodec.video.codecs import find_codec
@@ -27,7 +27,7 @@ class StreamTracks:
         self._header = header
         self._predicted = {header.picture_track(each.camera): each for each in header.predicted}
         self._alone = {track: codec.decoder() for track in header.tracks if track not in self._predicted}
-        self._others = {track: PredictedTrackDecoder(sizes[track.kind]) for track in self._predicted}
+        self._others = {track: PredictedTrackDecoder(sizes[TrackKind.TEXTURE]) for track in self._predicted}
 
     def decode(self, packets: Iterable[Packet]) -> dict[Track, Planes]:
         """The planes of one frame set, in the order of the tracks; packets of other tracks are ignored."""

@@ -9,6 +9,7 @@ from mvcodec.frames import DisparityMap, FloatMap, Picture
 from mvcodec.stream import TrackKind
 from mvcodec.video.codec import Plane
 from mvcodec.video.colour import even_size, pad_to_even
+from mvcodec.video.vp9_reference import frame_size
 
 MEDIANS = {1: 5, 2: 3}
 """Scale -> the default window of the median, px of the coded map. Wider ones save bits and lose thin things.
@@ -41,7 +42,7 @@ def track_sizes(width: int, height: int, scale: int) -> dict[TrackKind, tuple[in
     """Kind of a video track -> width and height of its pictures as coded."""
     return {
         TrackKind.TEXTURE: even_size(width, height),
-        TrackKind.PREDICTED: even_size(width, height),
+        TrackKind.PREDICTED: frame_size(even_size(width, height)),
         TrackKind.DISPARITY: coded_size(width, height, scale),
     }
 

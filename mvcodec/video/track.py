@@ -8,7 +8,7 @@ from mvcodec.errors import MissingReference, StreamError
 from mvcodec.stream import Packet
 from mvcodec.video.codec import Codec, Planes
 from mvcodec.video.reference_watch import ReferenceWatch
-from mvcodec.video.vp9_reference import PREDICTED, Vp9ReferenceDecoder
+from mvcodec.video.vp9_reference import PREDICTED, Vp9ReferenceDecoder, frame_size
 
 
 class TrackDecoder:
@@ -66,7 +66,7 @@ class PredictedTrackDecoder:
     """Decodes one track of pictures that are predicted from outside.
 
     Args:
-        size: (width, height) of its pictures as coded.
+        size: (width, height) of its pictures, both even.
 
     Attributes:
         lost: as `TrackDecoder`'s.
@@ -75,7 +75,7 @@ class PredictedTrackDecoder:
     def __init__(self, size: tuple[int, int]) -> None:
         self._size = size
         self._decoder = Vp9ReferenceDecoder(size)
-        self._watch = ReferenceWatch(PREDICTED, size)
+        self._watch = ReferenceWatch(PREDICTED, frame_size(size))
         self.lost = False
 
     def push(self, packet: Packet, label: str, predictions: Callable[[], list[Planes]] | None) -> Planes:
@@ -92,7 +92,7 @@ class PredictedTrackDecoder:
         if packet.keyframe and self.lost:
             self._decoder, self._watch = (
                 Vp9ReferenceDecoder(self._size),
-                ReferenceWatch(PREDICTED, self._size),
+                ReferenceWatch(PREDICTED, frame_size(self._size)),
             )
         self.lost = self.lost and not packet.keyframe
         if self.lost or predictions is None:

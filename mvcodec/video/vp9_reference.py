@@ -28,6 +28,7 @@ from mvcodec.video.vp9_syntax import parse_frame
 MOST_REFERENCES = 2
 MAX_QUANTIZER = 63
 SPEEDS = (0, 8)
+BLOCK = 8
 _GREY = 128
 _START_QUANTIZER = 63
 _HEAD = struct.Struct("<IB")
@@ -114,7 +115,7 @@ class Vp9ReferenceEncoder:
     def _started(self) -> tuple[libvpx.Vp9Encoder, list[bytes]]:
         """A new encoder, and the frames that give its references rooms of their own."""
         settings = self._settings
-        width, height = settings.width, settings.height
+        width, height = frame_size((settings.width, settings.height))
         encoder = libvpx.Vp9Encoder(width, height, settings.quantizer, settings.speed)
         grey = np.full(width * height * 3 // 2, _GREY, np.uint8)
         start = [encoder.encode(grey, libvpx.FORCE_KEY)]
@@ -153,15 +154,15 @@ class Vp9ReferenceDecoder:
         # Should something fail below, only a keyframe can follow.
         decoder, self._decoder = self._decoder, None
         if unit.start:
-            decoder = libvpx.Vp9Decoder(*self._size)
+            decoder = libvpx.Vp9Decoder(*frame_size(self._size))
             for number, grey in enumerate(unit.start):
-                _check(grey, self._size if number == 0 else None)
+                _check(grey, frame_size(self._size) if number == 0 else None)
                 decoder.decode(grey)
         assert decoder is not None
         _check(unit.frame, None)
         for place, prediction in zip(_PLACES, predictions, strict=False):
             decoder.set_reference(place, _joined(prediction))
-        found = Planes(*decoder.decode(unit.frame))
+        found = _cropped(decoder.decode(unit.frame), self._size)
         self._decoder = decoder
         return found
 
@@ -184,8 +185,31 @@ def _check(data: bytes, size: tuple[int, int] | None) -> None:
         raise NalError(f"a frame of {frame.sequence.unlike}")
 
 
+def frame_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of the VP9 frames for pictures of a size: the next multiples of BLOCK.
+
+    libvpx takes no reference from outside whose sides are none.
+    """
+    width, height = size
+    return -(-width // BLOCK) * BLOCK, -(-height // BLOCK) * BLOCK
+
+
 def _joined(planes: Planes) -> libvpx.Bytes:
-    return np.concatenate([plane.ravel() for plane in (planes.y, planes.u, planes.v)])
+    """I420 in one piece, of `frame_size`: the last column and row are repeated."""
+    height, width = planes.y.shape
+    right, below = (to - of for to, of in zip(frame_size((width, height)), (width, height), strict=True))
+    padded = [
+        np.pad(plane, ((0, below // part), (0, right // part)), mode="edge").ravel()
+        for plane, part in ((planes.y, 1), (planes.u, 2), (planes.v, 2))
+    ]
+    return np.concatenate(padded)
+
+
+def _cropped(planes: tuple[libvpx.Bytes, libvpx.Bytes, libvpx.Bytes], size: tuple[int, int]) -> Planes:
+    width, height = size
+    y, u, v = planes
+    half = slice(height // 2), slice(width // 2)
+    return Planes(*(np.ascontiguousarray(part) for part in (y[:height, :width], u[half], v[half])))
 
 
 def checksum(predictions: Sequence[Planes]) -> int:
