@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap, Mask
-from mvcodec.kernels import view_colour, view_depth, view_fetch, view_holes, view_planes
+from mvcodec.kernels import view_colour, view_depth, view_fetch, view_holes, view_planes, view_vectors
 from mvcodec.synthesis.layered import LayeredSettings
 
 SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11), (14, 8)]
@@ -283,10 +283,9 @@ def check_blend(rng: np.random.Generator, shape: Shape, count: int, chosen: Laye
         np.array([source.shift for source in sources[::-1]], np.float32),
         np.array([source.weight for source in sources[::-1]], np.float32),
         view,
-        (twins.spread(view, 1, 1) > tolerance).view(np.uint8),
         tolerance,
         chosen.edge_trust,
-        chosen.sharpness,
+        view_vectors.cubic_polynomial(chosen.sharpness),
         pixels,
         seen_by,
     )

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -109,15 +108,6 @@ class _Sources:
         return self.lumas, self.colours, self.disparities, self.fetchable
 
 
-def _contours(disparity: FloatMap, tolerance_px: float) -> NDArray[np.uint8]:
-    """uint8 (H, W), 1 where the 3 x 3 window holds more than one surface."""
-    nearest, farthest = (
-        change(disparity, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
-        for change in (cv2.dilate, cv2.erode)
-    )
-    return (nearest - farthest > tolerance_px).view(np.uint8)
-
-
 class Layered:
     """The `layered` synthesizer. Thread-safe; keeps what it prepared for the last decoded set.
 
@@ -175,7 +165,7 @@ class Layered:
     def _colour(
         self, sources: _Sources, cameras: CellCameras, disparity: FloatMap
     ) -> tuple[Picture, NDArray[np.uint8]]:
-        from mvcodec.kernels import view_colour, view_holes
+        from mvcodec.kernels import view_colour, view_holes, view_vectors
 
         settings = self.settings
         pixels: Picture = np.empty((*disparity.shape, 3), np.uint8)
@@ -188,10 +178,9 @@ class Layered:
             cameras.shifts,
             cameras.weights,
             disparity,
-            _contours(disparity, settings.tolerance_px),
             settings.tolerance_px,
             settings.edge_trust,
-            settings.sharpness,
+            view_vectors.cubic_polynomial(settings.sharpness),
             pixels,
             seen_by,
         )
