@@ -218,7 +218,7 @@ def test_the_default_leaves_maps_out_of_coarse_streams_of_whole_cells() -> None:
     assert EncoderConfig(qp=40).cameras_for(line) == "all"
     assert EncoderConfig(qp=None, bitrate_kbps=500).cameras_for(square_array) == "alternate"
     assert EncoderConfig(qp=40, disparity_cameras="all").cameras_for(square_array) == "all"
-    with pytest.raises(SettingError, match="disparity_cameras: found some, expected all or alternate"):
+    with pytest.raises(SettingError, match="disparity_cameras: found some, expected one of all, alternate"):
         EncoderConfig(disparity_cameras="some")
 
 

@@ -150,7 +150,7 @@ def test_follows_a_make_matcher() -> None:
 @pytest.mark.parametrize(
     ("settings", "text"),
     [
-        ({"split": "halves"}, "split: found halves, expected one of runs, levels"),
+        ({"split": "halves"}, "split: found halves, expected runs or levels"),
         ({"threshold": -1}, "threshold: found -1"),
         ({"erosion": 2}, "erosion: found 2"),
         ({"smoothing": 0}, "smoothing: found 0"),

@@ -132,12 +132,12 @@ def test_threads_share_one_renderer() -> None:
     ("name", "value", "expected"),
     [
         ("tolerance_px", 0.0, "0.001..1000"),
-        ("ratio", 0.99, "1.0..1000"),
-        ("reach_px", 0.49, "0.5..1.0"),
-        ("reach_px", 1.01, "0.5..1.0"),
+        ("ratio", 0.99, "1..1000"),
+        ("reach_px", 0.49, "0.5..1"),
+        ("reach_px", 1.01, "0.5..1"),
         ("spread", 0.0, "0.001..1000"),
-        ("edge_trust", 1.5, "0.001..1.0"),
-        ("sharpness", 0.1, "-1.0..0.0"),
+        ("edge_trust", 1.5, "0.001..1"),
+        ("sharpness", 0.1, "-1..0"),
         ("hole_reach_px", 0, "1..4096"),
         ("tolerance_px", float("nan"), "0.001..1000"),
     ],
@@ -145,4 +145,7 @@ def test_threads_share_one_renderer() -> None:
 def test_settings_are_checked(name: str, value: float, expected: str) -> None:
     with pytest.raises(SettingError) as error:
         LayeredSettings(**{name: value})  # type: ignore[arg-type]
-    assert str(error.value).startswith(f"LayeredSettings.{name}: found {value}, expected {expected}")
+    kind = "whole " if name == "hole_reach_px" else ""
+    assert str(error.value).startswith(
+        f"LayeredSettings.{name}: found {value}, expected a {kind}number, {expected}"
+    )

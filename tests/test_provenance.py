@@ -210,7 +210,10 @@ def test_missing_or_wrong_provenance_is_one_line(array: Path, coded: Path, tmp_p
     folder = tmp_path / "plain"
     succeeds("decode", coded, folder, "--frames", ":1")
     line = fails(1, "compare", array, folder, "--provenance", folder)
-    assert "000000.provenance.png: found no such file, expected one as decode --provenance writes" in line
+    assert (
+        "000000.provenance.png: found no such file, expected one, as decoding with provenance writes it"
+        in line
+    )
     for view in VIEWS:
         write_png(provenance_of(folder, view, 0), np.zeros((4, 5, 3), np.uint8))
     with pytest.raises(InputError, match=f"found 5x4 px, expected {WIDTH}x{HEIGHT} px"):

@@ -44,7 +44,7 @@ def test_other_texts_are_refused_with_the_choices(text: str) -> None:
     with pytest.raises(SettingError) as caught:
         select_real(text, 5, 5)
     assert str(caught.value) == (
-        f"--real: found {text or 'nothing'}, expected corners, all, every:K with K one of 1, 2, 4, "
+        f"real: found {text or 'nothing'}, expected corners, all, every:K with K one of 1, 2, 4, "
         "or rows (0,4 or 0,2,4 or 0,1,2,3,4) x cols (0,4 or 0,2,4 or 0,1,2,3,4) for this 5x5 grid"
     )
 

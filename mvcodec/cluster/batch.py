@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import json
+import shutil
 import tempfile
 import uuid
 from collections.abc import Callable, Sequence
@@ -17,7 +19,7 @@ import mvcodec
 from mvcodec.cluster.places import Place
 from mvcodec.cluster.recordings import Recording
 from mvcodec.cluster.segments import cut
-from mvcodec.cluster.tasks import Outcome, join_parts, run_command
+from mvcodec.cluster.tasks import PART, Outcome, join_parts, run_command
 from mvcodec.errors import OutputError
 
 RECORDS = "batch"
@@ -266,6 +268,7 @@ class _Run:
             "last_task": asdict(outcome),
         }
         _write(_record(self._batch, job.recording), record)
+        _remove_parts(job.target)
 
     def _submit(
         self,
@@ -304,6 +307,13 @@ def _flat(options: Sequence[Option]) -> list[str]:
 def _is_verdict(outcome: Outcome) -> bool:
     """Whether a command failed because a file is not clean, which is what was asked."""
     return isinstance(outcome.result, dict) and "findings" in outcome.result
+
+
+def _remove_parts(target: Place) -> None:
+    """Remove what runs that were killed left beside an output that is whole now."""
+    if target.local is not None:
+        for folder in target.local.parent.glob(f".{glob.escape(target.name)}.*{PART}"):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _write(place: Place, document: Any) -> None:

@@ -23,6 +23,9 @@ from mvcodec.errors import MvCodecError
 
 CHILD = "mvcodec.cli.child"
 
+PART = ".part"
+"""The ending of folders that hold an output until it is whole."""
+
 POLL_SECONDS = 0.5
 """How often a worker looks whether its child is done."""
 
@@ -78,7 +81,7 @@ def run_command(
         with Place(source).fetched() as found:
             if target is None:
                 return _child([command, str(found), *options], run)
-            with _workplace(Place(target)) as part:
+            with _workplace(Place(target), run) as part:
                 outcome = _child([command, str(found), str(part), *options], run)
                 if outcome.error is None:
                     Place(target).put(part)
@@ -94,7 +97,10 @@ def join_parts(parts: Sequence[str], target: str, run: str) -> Outcome:
         Lost: it was killed.
     """
     try:
-        with tempfile.TemporaryDirectory(prefix="mvcodec-join-") as folder, _workplace(Place(target)) as made:
+        with (
+            tempfile.TemporaryDirectory(prefix="mvcodec-join-") as folder,
+            _workplace(Place(target), run) as made,
+        ):
             here = [_here(Place(part), Path(folder)) for part in parts]
             outcome = _child(["join", *map(str, here), str(made), "--json"], run)
             if outcome.error is None:
@@ -117,16 +123,17 @@ def _here(part: Place, folder: Path) -> Path:
 
 
 @contextmanager
-def _workplace(target: Place) -> Iterator[Path]:
+def _workplace(target: Place, run: str) -> Iterator[Path]:
     """A path for a new output, beside its target where that is on this machine; nothing stays there.
 
-    It has the same name at each try, so that what a killed try left behind is removed by the next one.
+    It has the same name at each try of one run, so that what a killed try left behind is removed by the next
+    one; another run, whose cancelled tasks may take a while to end, has others.
     """
     if target.local is None:
         with tempfile.TemporaryDirectory(prefix="mvcodec-out-") as made:
             yield Path(made) / target.name
         return
-    folder = target.local.parent / f".{target.name}.part"
+    folder = target.local.parent / f".{target.name}.{run[-8:]}{PART}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     try:

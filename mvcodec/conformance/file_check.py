@@ -27,6 +27,7 @@ from mvcodec.container.records import (
     HEAD,
     MAGIC,
     RecordError,
+    UnknownPacking,
     chunk_places,
     find_chunk,
     parse_chunk,
@@ -175,7 +176,7 @@ class FileCheck:
             )
             self._seen.chunks.append(index)
             messages = self._unpacked(unpack(head, packed, self._limits))
-        except RecordError as damage:
+        except (RecordError, UnknownPacking) as damage:
             self._damaged = _DamagedChunk(str(damage), times_ns, [])
             self._walk.whole = False
             return
