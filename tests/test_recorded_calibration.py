@@ -24,6 +24,7 @@ from mvcodec.capture.recorded_calibration import NotRectified, array_calibration
 from mvcodec.capture.recording import Recording
 from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.container import McapReader
+from mvcodec.container.message_schema import MessageSchema
 from mvcodec.container.recorded_rig import RecordedRig
 
 SIZE = (96, 64)
@@ -73,7 +74,8 @@ def make_rig(*, places: bool = True) -> Rig:
 def taken(rig: Rig, size: tuple[int, int] = SIZE) -> tuple[Calibration, float] | None:
     found = RecordedRig()
     for message in rig.values():
-        found.push(message.DESCRIPTOR.full_name, "protobuf", message.SerializeToString())
+        schema = MessageSchema(message.DESCRIPTOR.full_name, "protobuf")
+        found.push("/rig", schema, message.SerializeToString())
     return array_calibration(found, {camera: frame_of(camera) for camera in ARRAY.real}, size)
 
 

@@ -23,6 +23,12 @@ from mvcodec.frames import Picture
 MAX_PIXELS = 1 << 26
 """The largest picture that is taken: twice 8K."""
 
+_DEPTH_MAP = "compressedDepth"
+"""In formats of ROS: a PNG or RVL of depth behind a header of its own."""
+
+_SWAPPED = "compressed rgb"
+"""ROS's own reader swaps red and blue of such pictures; many senders of them do not."""
+
 _COMPRESSED = "JPEG, PNG, WEBP, TIFF or BMP"
 
 
@@ -36,6 +42,7 @@ class StillDecoder:
 
     def __init__(self, name: str, depth: BitDepth) -> None:
         self._name, self._depth, self._told_alpha = name, depth, False
+        self._told: set[str] = set()
 
     def look(self, message: RecordedPicture) -> None:
         """Take a picture into account for the depth of the recording; what is wrong with it is told later."""
@@ -57,6 +64,14 @@ class StillDecoder:
         return self._image(message) if message.kind == "image" else self._raw(message)
 
     def _image(self, message: RecordedPicture) -> Picture:
+        if _DEPTH_MAP in message.format:
+            found = f"a depth map in format {message.format!r}, which is not supported"
+            raise self._error(message, found, "a topic of colour or grey pictures")
+        if _SWAPPED in message.format:
+            self._tell_once(
+                f"{message.topic}: its format {message.format!r} may say that red and blue are swapped; its"
+                " pictures are taken as they say themselves"
+            )
         try:
             with opened_still(message.data) as picture:
                 if picture.width * picture.height > MAX_PIXELS:
@@ -99,10 +114,13 @@ class StillDecoder:
         return encoding, values.reshape(height, width, encoding.channels)
 
     def _tell_alpha(self, message: RecordedPicture) -> None:
-        if not self._told_alpha:
-            self._told_alpha = True
-            text = f"{self._name}: {message.topic}: how opaque its pixels are is left out"
-            warnings.warn(text, MvCodecWarning, stacklevel=4)
+        self._told_alpha = True
+        self._tell_once(f"{message.topic}: how opaque its pixels are is left out")
+
+    def _tell_once(self, text: str) -> None:
+        if text not in self._told:
+            self._told.add(text)
+            warnings.warn(f"{self._name}: {text}", MvCodecWarning, stacklevel=4)
 
     def _error(self, message: RecordedPicture, found: str, expected: str) -> InputError:
         return InputError(f"{self._name}: {message.label}", found, expected)

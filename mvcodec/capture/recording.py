@@ -192,7 +192,9 @@ class Recording:
         self.calibration_note = "no calibration given"
         try:
             assert self._reader.rig is not None
-            found = array_calibration(self._reader.rig, self._frames, (width, height))
+            topics = {position: topic for topic, position in self._topics.items()}
+            frames = self._reader.rig.tell_apart(self._frames, topics)
+            found = array_calibration(self._reader.rig, frames, (width, height))
         except NotRectified as reason:
             self.calibration_note = f"its calibration is not that of a rectified array ({reason})"
             found = None

@@ -16,6 +16,7 @@ from mvcodec.container.declared import Declared
 from mvcodec.container.exact_file import ExactFile
 from mvcodec.container.file_index import FileIndex, read_index
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.container.message_schema import MessageSchema
 from mvcodec.container.record_walk import RecordWalk
 from mvcodec.container.records import (
     DAMAGE,
@@ -113,8 +114,8 @@ class ChunkReader:
                     self._declared.note(record[1])
         return self._declared.facts
 
-    def schema_of(self, topic: str) -> tuple[str, str]:
-        """Name of the schema and message encoding of a topic seen so far; empty where there is none."""
+    def schema_of(self, topic: str) -> MessageSchema:
+        """How the messages of a topic seen so far are written; empty where nothing says so."""
         return self._declared.schema_of(topic)
 
     def chunks(self, first: int = 0, end_ns: int | None = None) -> Iterator[list[TopicMessage]]:

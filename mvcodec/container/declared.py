@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from mcap.data_stream import ReadDataStream
 from mcap.records import Channel, Message, Metadata, Schema
 
+from mvcodec.container.message_schema import MessageSchema
 from mvcodec.container.records import DAMAGE, RecordError
 
 METADATA_NAME = "mvcodec"
@@ -51,11 +52,14 @@ class Declared:
         """The channels of a topic."""
         return [number for number, channel in self._channels.items() if channel.topic == topic]
 
-    def schema_of(self, topic: str) -> tuple[str, str]:
-        """Name of the schema and message encoding of a topic; empty where there is none."""
+    def schema_of(self, topic: str) -> MessageSchema:
+        """How a topic's messages are written; empty where nothing says so."""
         channel = next((channel for channel in self._channels.values() if channel.topic == topic), None)
+        encoding = "" if channel is None else channel.message_encoding
         schema = None if channel is None else self._schemas.get(channel.schema_id)
-        return "" if schema is None else schema.name, "" if channel is None else channel.message_encoding
+        if schema is None:
+            return MessageSchema("", encoding)
+        return MessageSchema(schema.name, encoding, schema.encoding, schema.data)
 
     def add(self, record: Channel | Schema) -> None:
         """A channel or a schema."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import BinaryIO, Literal
 
@@ -10,8 +10,15 @@ from mcap.records import Message
 
 from mvcodec.container.chunks import ChunkReader, OnDamage, TopicMessage
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
-from mvcodec.container.picture_schemas import PARSERS, DamagedMessage, PictureKind
-from mvcodec.container.recorded_rig import RIG_SCHEMAS, RecordedRig
+from mvcodec.container.message_schema import DamagedMessage
+from mvcodec.container.picture_schemas import (
+    PictureKind,
+    expected_instead,
+    is_picture,
+    looks_like_picture,
+    picture_parser,
+)
+from mvcodec.container.recorded_rig import RecordedRig, is_about_rig
 from mvcodec.container.time_order import in_time_order, was_set_back
 from mvcodec.errors import StreamError
 
@@ -132,41 +139,40 @@ class RecordingReader:
         """Read what the files say about cameras, wherever it is."""
         assert self.rig is not None
         for part in self._parts:
-            about = [topic for topic in part.topics if part.schema_of(topic) in RIG_SCHEMAS]
+            about = [topic for topic in part.topics if is_about_rig(part.schema_of(topic))]
             for topic in about:
                 for chunk in part.chunks_with([topic])[:_RIG_CHUNKS]:
                     for found, message in part.read_chunk(chunk):
                         if found == topic:
-                            self.rig.push(*part.schema_of(topic), message.data)
+                            self.rig.push(topic, part.schema_of(topic), message.data)
 
     def _as_written(self, part: ChunkReader) -> Iterator[TopicMessage]:
         for chunk in part.chunks():
             if self.rig is not None and not self.indexed:
                 for topic, message in chunk:
                     if topic not in self._topics:
-                        self.rig.push(*part.schema_of(topic), message.data)
+                        self.rig.push(topic, part.schema_of(topic), message.data)
             yield from (item for item in chunk if item[0] in self._topics)
 
     def _check_topics(self, there: set[str]) -> None:
         missing = sorted(self._topics - there)
         if missing:
-            choices = [topic for topic in sorted(there) if self._parser(topic) is not None]
-            expected = f"a topic with pictures: {', '.join(choices[:10]) or 'there is none'}"
+            schemas = {topic: part.schema_of(topic) for part in self._parts for topic in part.topics}
+            choices = [topic for topic in sorted(there) if is_picture(schemas[topic])]
+            others = [t for t in sorted(there) if not choices and looks_like_picture(schemas[t])]
+            listed = choices or [f"{topic} ({schemas[topic]}, which is not supported)" for topic in others]
+            expected = f"a topic with pictures: {', '.join(listed[:10]) or 'there is none'}"
             raise StreamError(self.name, f"no topic {missing[0]}", expected)
 
-    def _parser(self, topic: str) -> Callable[[bytes], object] | None:
-        return next((found for part in self._parts if (found := PARSERS.get(part.schema_of(topic)))), None)
-
     def _picture(self, part: ChunkReader, topic: str, message: Message) -> RecordedPicture | None:
-        schema, encoding = part.schema_of(topic)
+        schema = part.schema_of(topic)
         label = f"{self.name}: {topic} at {message.log_time / 1e9:.3f} s"
-        if (schema, encoding) not in PARSERS:
-            known = " or ".join(dict.fromkeys(name for name, _ in PARSERS))
-            raise StreamError(label, f"{schema or 'no schema'} as {encoding}, which is not supported", known)
+        if not is_picture(schema):
+            raise StreamError(label, f"{schema}, which is not supported", expected_instead(schema))
         try:
-            found = PARSERS[schema, encoding](message.data)
+            found = picture_parser(schema)(message.data)
         except DamagedMessage as error:
-            damage = StreamError(label, f"a damaged message ({error})", schema)
+            damage = StreamError(label, f"a message that cannot be read ({error})", schema.name)
             if self._on_damage is None:
                 raise damage from None
             self._on_damage(damage)
