@@ -74,7 +74,7 @@ def single_page(title: str, recording: bytes | str, poster: str | None = None) -
 def shown_in_frame(page: str, height_px: int = 480) -> str:
     """HTML that shows a page inside another one, as notebooks do."""
     return (
-        f'<iframe srcdoc="{html.escape(page)}" allow="fullscreen; xr-spatial-tracking" '
+        f'<iframe srcdoc="{html.escape(page)}" allow="fullscreen" '
         f'style="width: 100%; height: {height_px}px; border: 0" title="mvcodec"></iframe>'
     )
 

@@ -23,7 +23,6 @@ export interface Actions {
   openFile(): void;
   toggleFullscreen(): void;
   showHelp(): void;
-  enterVr(): void;
   /** A small picture of a time; undefined where there is none. */
   peek(seconds: number): Promise<ImageData | undefined>;
 }
@@ -58,7 +57,6 @@ export class Controls {
   readonly #eyes = element("select", { "aria-label": TEXTS.views });
   readonly #wipe = element("input", { type: "range", min: "0", max: "1", step: "0.01", value: "0" });
   readonly #focus = element("input", { type: "range", min: "0", max: "100", step: "1", value: "0" });
-  readonly #vr: HTMLButtonElement;
   #range: readonly [number, number] = [0, 1];
   #duration = 0;
   #peeked = 0;
@@ -66,18 +64,12 @@ export class Controls {
   constructor(actions: Actions) {
     this.#actions = actions;
     this.#play = button(TEXTS.play, icon("play"), () => actions.togglePlay());
-    this.#vr = button(TEXTS.enterVr, TEXTS.enterVr, () => actions.enterVr());
-    this.#vr.hidden = true;
     options(this.#speed, SPEEDS.map((speed) => [String(speed), `${speed}×`]));
     options(this.#look, Object.entries(TEXTS.looks));
     options(this.#eyes, Object.entries(TEXTS.eyes));
     this.menu = this.#makeMenu();
     this.bar = this.#makeBar();
     this.#listen();
-  }
-
-  showVr(): void {
-    this.#vr.hidden = false;
   }
 
   setRange(range: readonly [number, number]): void {
@@ -146,7 +138,6 @@ export class Controls {
       act(TEXTS.copyLink, () => actions.copyLink()),
       act(TEXTS.openFile, () => actions.openFile()),
       act(TEXTS.help, () => actions.showHelp()),
-      this.#vr,
     );
   }
 

@@ -14,7 +14,6 @@ import { apertureOf, drawShown, eyesOf, type Eyes } from "./drawing.ts";
 import { Playback } from "./playback.ts";
 import { Tempo } from "./tempo.ts";
 
-/** Told to whoever shows the controls. */
 export interface EngineEvents {
   /** Another picture is on the screen. */
   onFrame(): void;
@@ -73,7 +72,9 @@ export class Engine {
   decodeMs = 0;
   #isFetching = false;
   #isDirty = false;
+  /** What is on the screen has all detail; what is drawn next is to have it. */
   #isFinal = false;
+  #isFinalDue = false;
   #drawnView: Viewpoint | undefined;
   #tick: number | undefined;
   #stands: ReturnType<typeof setTimeout> | undefined;
@@ -248,9 +249,10 @@ export class Engine {
     const isReady = this.#fetch() || this.#drawnView !== this.shown.view;
     if (isReady && this.#isDirty && this.#decoded !== undefined) {
       this.#isDirty = false;
-      const moves = playback.isPlaying || this.#stands !== undefined;
-      this.#draw(!moves || this.tempo.isQuick);
-      if (moves) this.tempo.drawn(now);
+      const isFinal = this.#isFinalDue || this.tempo.isQuick;
+      this.#isFinalDue = false;
+      this.#draw(isFinal);
+      if (!isFinal) this.tempo.drawn(now);
       this.#events.onFrame();
       this.#standsSoon();
     }
@@ -264,7 +266,9 @@ export class Engine {
     this.#stands = setTimeout(() => {
       this.#stands = undefined;
       this.tempo.rest();
-      if (!this.#isFinal && !this.playback.isPlaying) this.wake();
+      if (this.#isFinal || this.playback.isPlaying) return;
+      this.#isFinalDue = true;
+      this.wake();
     }, STANDS_MS);
   }
 

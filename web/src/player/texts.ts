@@ -22,8 +22,6 @@ export const TEXTS = {
   copyLink: "Copy link",
   linkCopied: "Link copied",
   openFile: "Open a file",
-  enterVr: "Enter VR",
-  loopSection: "Loop from here (a) to there (b)",
   recording: "Recording until the end of the loop",
   live: "live",
   noFile: "Drop an .mcap file here, or open one",

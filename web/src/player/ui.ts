@@ -287,7 +287,6 @@ export class Ui {
       openFile: () => this.openFile(),
       toggleFullscreen: () => this.toggleFullscreen(),
       showHelp: () => this.showHelp(),
-      enterVr: () => {},
       peek: async (seconds: number) => this.#engine?.peek(seconds, PEEK_PX),
     };
   }
