@@ -16,9 +16,16 @@ from small_arrays import photograph
 
 from mvcodec.errors import MissingReference, SettingError, StreamError
 from mvcodec.video import libvpx
+from mvcodec.video.access_unit import Colour
 from mvcodec.video.codec import Planes
 from mvcodec.video.colour import to_planes
-from mvcodec.video.vp9_reference import ReferenceSettings, Vp9ReferenceDecoder, Vp9ReferenceEncoder
+from mvcodec.video.vp9_reference import (
+    ReferenceSettings,
+    ReferenceUnit,
+    ReferenceUnits,
+    Vp9ReferenceDecoder,
+    Vp9ReferenceEncoder,
+)
 
 WIDTH, HEIGHT, FRAMES = 96, 64, 5
 
@@ -94,10 +101,22 @@ def test_every_keyframe_is_a_place_to_begin(references: int) -> None:
         np.testing.assert_array_equal(one.v, other.v)
 
 
-def test_another_prediction_is_told_by_its_checksum() -> None:
+def test_another_prediction_is_told_before_a_wrong_picture_comes_of_it() -> None:
     decoder = Vp9ReferenceDecoder((WIDTH, HEIGHT))
-    with pytest.raises(MissingReference, match="unit 0: found a prediction that is not the encoder's"):
-        decoder.push(coded()[0], [picture(0, "chelsea")], True, "unit 0")
+    with pytest.raises(MissingReference, match="x: found a prediction that is not the encoder's"):
+        decoder.push(coded()[0], [picture(0, "chelsea")], True, "x")
+
+
+def test_units_say_what_they_are_without_being_decoded() -> None:
+    reader = ReferenceUnits()
+    facts = [reader.push(unit) for unit in coded()]
+    assert [each.keyframe for each in facts] == [True, False, False, True, False]
+    assert facts[0].sizes == ((WIDTH, HEIGHT),)
+    assert facts[0].sequences[0].colour == Colour(False, 1, 1, 1)
+    assert all(each.missing is None and each.broken == () for each in facts)
+    assert ReferenceUnits().push(coded()[1]).missing == "a picture before the first keyframe"
+    unit = ReferenceUnit.parse(coded()[0])
+    assert unit.to_bytes() == coded()[0]
 
 
 @settings(max_examples=60, deadline=None)
@@ -116,17 +135,18 @@ def test_damage_is_one_error_and_a_keyframe_heals_it(data: st.DataObject) -> Non
 
 
 @pytest.mark.parametrize(
-    "unit", [b"", b"\x01", b"\x03abc", b"\x00", b"\x01\xff\xff\x00", b"\x01\x00\x00\x82"]
+    "unit",
+    [b"", b"\x01", b"1234", b"1234\x03abc", b"1234\x00", b"1234\x01\xff\xff\x00", b"1234\x01\x00\x00\x82"],
 )
 def test_what_is_no_unit_is_refused(unit: bytes) -> None:
     decoder = Vp9ReferenceDecoder((WIDTH, HEIGHT))
     with pytest.raises(StreamError, match="x: found"):
-        decoder.push(unit, predictions(0), bool(unit and unit[0]), "x")
+        decoder.push(unit, predictions(0), True, "x")
 
 
 def test_a_picture_of_another_size_is_refused_before_it_takes_memory() -> None:
     with pytest.raises(StreamError, match="a picture of another size"):
-        Vp9ReferenceDecoder((WIDTH + 2, HEIGHT)).push(coded()[0], predictions(0), True, "x")
+        Vp9ReferenceDecoder((WIDTH + 8, HEIGHT)).push(coded()[0], predictions(0), True, "x")
 
 
 def test_pictures_without_their_keyframe_are_refused() -> None:
@@ -143,6 +163,7 @@ PROGRAM = """
 import sys
 sys.path.insert(0, {tests!r})
 from mvcodec.video import libvpx
+from mvcodec.video.access_unit import Colour
 libvpx.places = lambda: iter([{library!r}])
 import test_vp9_reference as t
 from zlib import crc32

@@ -4,8 +4,9 @@
                                [--frames A:B] [--json]
 
 Forms: `plain` (what encode writes by default), `none` (no maps in the file), `synthesis` (real cameras coded
-from each other). All views of the input's grid are rendered and compared, the container counts. The last
-lines are BD-rates against the first form.
+from each other), `synthesis-alternate` (and maps from every second one, whatever the array). All views of the
+input's grid are rendered and compared, the container counts. The last lines are BD-rates against the first
+form.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ FORMS: Mapping[str, Mapping[str, str]] = {
     "plain": {},
     "none": {"disparity_cameras": "none"},
     "synthesis": {"prediction": "synthesis"},
+    "synthesis-alternate": {"prediction": "synthesis", "disparity_cameras": "alternate"},
 }
 QPS = "22,27,32,37,42"
 
