@@ -20,12 +20,13 @@ from mvcodec.cli.progress import progress
 from mvcodec.errors import SettingError
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.output.atomic import write_bytes
-from mvcodec.rigs.calibration import Calibrated, calibrate
+from mvcodec.rigs.calibration import Calibrated, Wishes, calibrate_from_files, calibrate_from_scene
 from mvcodec.rigs.framing import CROPS
 from mvcodec.rigs.remap import DEFAULT_INTERPOLATION, INTERPOLATIONS, RectifiedSource, Rectifier
 from mvcodec.rigs.rig import rig_text
 
 RIG_NAME = "rig.json"
+WAYS = ("scene", "file")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,6 +45,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a folder for the rectified pictures and the rig, or a .json file for the rig alone",
     )
     parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
+    parser.add_argument(
+        "--from",
+        dest="how",
+        choices=WAYS,
+        help="what says how the cameras are (default: scene, or what there are options for)",
+    )
+    parser.add_argument(
+        "--calibration",
+        type=local_path,
+        nargs="+",
+        metavar="FILE",
+        help="of the cameras in row order: Kalibr, EuRoC or ROS YAML; or one RIG.json",
+    )
     parser.add_argument(
         "--crop",
         choices=CROPS,
@@ -80,7 +94,7 @@ def run(arguments: argparse.Namespace) -> None:
         check_folder_target(output, names, overwrite=arguments.overwrite)
     source = open_input(arguments.input, grid=arguments.grid, real="all")
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
-    found = calibrate(source, chosen, crop=arguments.crop, size=arguments.size)
+    found = _calibrated(source, chosen, arguments)
     text = rig_text(found.rig)
     if output.suffix.lower() == ".json":
         write_bytes(output, text.encode())
@@ -91,6 +105,17 @@ def run(arguments: argparse.Namespace) -> None:
         print(json.dumps(found.rig.document()))
     elif not arguments.quiet:
         print(f"{output}: {found.summary()}")
+
+
+def _calibrated(source: ArraySource, chosen: range, arguments: argparse.Namespace) -> Calibrated:
+    way = arguments.how or ("file" if arguments.calibration else "scene")
+    if (way == "file") != bool(arguments.calibration):
+        found = f"{len(arguments.calibration or [])} files with --from {way}"
+        raise SettingError("--calibration", found, "--from file, and the files of the cameras in row order")
+    wishes = Wishes(arguments.crop, arguments.size)
+    if way == "file":
+        return calibrate_from_files(source, chosen, arguments.calibration, wishes)
+    return calibrate_from_scene(source, chosen, wishes)
 
 
 def _write_folder(

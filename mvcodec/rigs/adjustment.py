@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from mvcodec.array import CameraArray
 from mvcodec.rigs.features import Tracks
 
 Vectors = NDArray[np.float64]
@@ -26,7 +27,7 @@ Vectors = NDArray[np.float64]
 MOST_OBSERVATIONS = 9000
 _NEWTON_STEPS = 6
 _LOOSEST_RADIUS = 3.0
-_SHARED, _EACH = 4, 9
+_SHARED, _EACH = 4, 11
 _STEP = 1e-6
 
 
@@ -43,6 +44,7 @@ class Priors:
         k1_each, k2_each: of each camera's own against it.
         place_steps: of each coordinate of a camera.
         stretch: of the logarithm of the height of the grid's steps.
+        centre: of each coordinate of a principal point, in widths of the picture.
     """
 
     angle_rad: float = 0.2
@@ -55,6 +57,7 @@ class Priors:
     k2_each: float = 0.01
     place_steps: float = 0.01
     stretch: float = 0.1
+    centre: float = 0.004
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +69,7 @@ class Cameras:
         focal_px: float64 (N,).
         k1, k2: float64 (N,), Brown's radial distortion.
         places: float64 (N, 3), steps of the grid.
+        centres_px: float64 (N, 2), (cx, cy).
         stretch: factor on the height of the grid's steps, which `places` have in them.
     """
 
@@ -74,6 +78,7 @@ class Cameras:
     k1: Vectors
     k2: Vectors
     places: Vectors
+    centres_px: Vectors
     stretch: float
 
 
@@ -100,6 +105,11 @@ class _Round:
 
     noise_px: float
     bound_px: float
+
+
+def scene_priors(array: CameraArray) -> Priors:
+    """What is expected of an ordinary rig: a focal length that is given is good to some percent."""
+    return Priors(focal=0.02) if array.calibration.given else Priors()
 
 
 def adjust(
@@ -164,7 +174,7 @@ class _Problem:
         self._heights = grid[:, 1] * bool(np.ptp(grid[:, 0]))
         p = priors
         self._shared = np.array([p.focal, p.k1, p.k2, p.stretch])
-        self._each = np.array([p.angle_rad] * 3 + [p.focal_each, p.k1_each, p.k2_each] + [p.place_steps] * 3)
+        self._each = np.array([p.angle_rad] * 3 + [p.focal_each, p.k1_each, p.k2_each] + [p.place_steps] * 3 + [p.centre * size[0]] * 2)
         self.unknowns = _SHARED + _EACH * self._count
         self._gauge = self._gauge_rows()
 
@@ -200,9 +210,8 @@ class _Problem:
         x, y = self._grid.T
         places = np.column_stack([x, y + self._heights * np.expm1(stretch), 0 * x]) + each[:, 6:9]
         focal_px = self._focal_px * np.exp(focal + each[:, 3])
-        return Cameras(
-            each[:, :3], focal_px, k1 + each[:, 4], k2 + each[:, 5], places, float(np.exp(stretch))
-        )
+        lens = focal_px, k1 + each[:, 4], k2 + each[:, 5]
+        return Cameras(each[:, :3], *lens, places, self._centre + each[:, 9:11], float(np.exp(stretch)))
 
     def solved(self, values: Vectors, tracks: Tracks, noise_px: float) -> Vectors:
         """The unknowns that explain the points best; observations count less beyond twice the noise."""
@@ -236,7 +245,7 @@ class _Problem:
 
     def _slopes(self, cameras: Cameras, tracks: Tracks) -> tuple[Vectors, Vectors]:
         """(T, N, 2): slopes of the rays in the array's axes; (T, N, 1): px of the picture for 1 of it."""
-        places = (tracks.xy_px - self._centre) / cameras.focal_px[:, None]
+        places = (tracks.xy_px - cameras.centres_px) / cameras.focal_px[:, None]
         distorted = np.hypot(places[..., 0], places[..., 1])
         factor = (straight_radius(distorted, cameras.k1, cameras.k2) / np.maximum(distorted, 1e-12))[
             ..., None
