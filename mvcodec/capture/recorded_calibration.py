@@ -84,6 +84,79 @@ def array_calibration(
     return Calibration(fx, fy, *first.centre_px, baseline, d_inf), rho
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedCamera:
+    """A camera as its pictures come, with its lens: what K and D of a recording say.
+
+    Attributes:
+        frame: frame_id of its pictures.
+        size: (width, height) that its calibration is for; zeros where it doesn't say.
+        model: of the distortion, as the message has it.
+        k: float64 (3, 3).
+        d: float64 (N,), coefficients of the distortion.
+        turn: float64 (3, 3), takes a direction in axes that all cameras share to one in the camera's.
+        centre_m: float64 (3,), where it stands in these axes.
+        is_straight: its rectification changes nothing: no distortion, R is the identity and P holds K.
+    """
+
+    frame: str
+    size: tuple[int, int]
+    model: str
+    k: Matrix
+    d: Matrix
+    turn: Matrix
+    centre_m: Matrix
+    is_straight: bool
+
+
+def recorded_cameras(rig: RecordedRig, frames: Mapping[Position, str]) -> dict[Position, RecordedCamera]:
+    """The cameras before rectification; none where a calibration is missing.
+
+    A transform leads from the axes of the pictures' frame. Without transforms, R leads to the rectified
+    axes that all cameras share, and P's fourth column to the place in them.
+    """
+    if rig.nominal or not all(frame in rig.calibrations for frame in frames.values()):
+        return {}
+    poses = {frame: _pose(rig.transforms, frame) for frame in frames.values()}
+    placed = len({root for root, _, _ in poses.values()}) == 1 and all(
+        frame in rig.transforms for frame in frames.values()
+    )
+    found = {}
+    for position, frame in frames.items():
+        message = rig.calibrations[frame]
+        if len(message.K) != 9 or min(message.K[0], message.K[4]) <= 0:
+            return {}
+        _, turn, place = poses[frame]
+        if not placed:
+            projection = np.array(message.P or _extended(message.K), np.float64)
+            if projection.size != 12 or min(projection[[0, 5]]) <= 0:
+                return {}
+            turn = np.array(message.R if len(message.R) == 9 else np.eye(3).ravel()).reshape(3, 3)
+            place = np.array([-projection[3] / projection[0], -projection[7] / projection[5], 0.0])
+        found[position] = RecordedCamera(
+            frame,
+            (message.width, message.height),
+            message.distortion_model,
+            np.array(message.K, np.float64).reshape(3, 3),
+            np.array(message.D, np.float64),
+            turn.T,
+            place,
+            _is_straight(message),
+        )
+    return found
+
+
+def _is_straight(message: Any) -> bool:
+    k, d = np.array(message.K, np.float64).reshape(3, 3), np.array(message.D, np.float64)
+    p = np.array(message.P or _extended(message.K), np.float64).reshape(3, 4)[:, :3]
+    turn = np.array(message.R if len(message.R) == 9 else np.eye(3).ravel()).reshape(3, 3)
+    return bool(
+        np.abs(d).max(initial=0.0) < 1e-9
+        and np.abs(turn - np.eye(3)).max() < np.radians(ANGLE_DEG)
+        and np.abs(k - p).max() < CENTRE_PX
+    )
+
+
 def _cameras(
     rig: RecordedRig, frames: Mapping[Position, str], size: tuple[int, int]
 ) -> dict[Position, _Camera]:

@@ -12,13 +12,14 @@ from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.capture.bit_depth import BitDepth
 from mvcodec.capture.message_clock import MessageClock
 from mvcodec.capture.pairing import NEAREST_SHARE, TOLD_SHARE, typical_step_ns
-from mvcodec.capture.recorded_calibration import NotRectified, array_calibration
+from mvcodec.capture.recorded_calibration import NotRectified, array_calibration, recorded_cameras
 from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.capture.selection import select_real
 from mvcodec.capture.timing import rate_of_times
 from mvcodec.capture.topic_pictures import TopicPictures, WaitingPicture
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.recorded_pictures import RecordedPicture, RecordingReader
+from mvcodec.container.recorded_rig import RecordedRig
 from mvcodec.errors import InputError, MvCodecWarning
 from mvcodec.frames import FrameSet, Picture
 from mvcodec.workers import run_all
@@ -51,6 +52,7 @@ class Recording:
     Attributes:
         array: geometry, known from the first frame set and what was recorded of the cameras up to then.
         calibration_note: why the calibration is nominal; empty where it is not.
+        cameras: what was recorded of the cameras' lenses; empty where that is not all of them.
 
     Raises:
         InputError: no frame set, or pictures that are damaged or of different sizes.
@@ -99,6 +101,7 @@ class Recording:
         self.calibration_note = ""
         self._first = self._read_first()
         self.array = self._make_array(self._first[0])
+        self.cameras = recorded_cameras(self._reader.rig or RecordedRig(), self._frames)
         self._reader.rig = None
 
     @property

@@ -31,6 +31,7 @@ from mvcodec.cli.live_view_option import add_live_view, live_view
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.picture_options import add_picture_options, reading_of
 from mvcodec.cli.progress import progress
+from mvcodec.cli.rig_option import add_rig, rectified_source
 from mvcodec.cli.safety import add_chunk_ms
 from mvcodec.cli.segment_options import add_segment, check_continues, plan
 from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD
@@ -77,6 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--depth", choices=("raw16",), help="add metric depth, foxglove.RawImage of 16 bits, millimetres"
     )
     parser.add_argument("--nominal", action="store_true", help="accept nominal calibration for --depth")
+    add_rig(parser)
     add_chunk_ms(parser)
     add_live_view(parser)
     add_time_options(parser)
@@ -135,8 +137,9 @@ def _check_effect(arguments: argparse.Namespace) -> None:
 
 
 def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
-    source = _open(arguments)
+    source: ArraySource = _open(arguments)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
+    source = rectified_source(source, chosen, arguments)
     array = source.array
     if arguments.calibration is not None:
         array = replace(array, calibration=read_calibration(arguments.calibration))

@@ -19,6 +19,7 @@ from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_view_option import live_view
 from mvcodec.cli.picture_options import reading_of
 from mvcodec.cli.progress import progress
+from mvcodec.cli.rig_option import RectifiedStream, rectified_stream
 from mvcodec.cli.standard_streams import INPUT_NAME, STANDARD, standard_input, standard_output
 from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.cli.time_options import timing_of
@@ -106,19 +107,20 @@ def encode_stream(
     """Code frame sets as they come; returns the writer, closed."""
     first, stop = _frames(arguments.frames)
     with live_view(arguments) as view, _opened(arguments) as source:
-        config = make_config(source.array)
+        straight = rectified_stream(source, arguments)
+        config = make_config(straight.array)
         span = arguments.disparity_range
         if isinstance(span, tuple):
             config = replace(config, disparity_range_px=span)
-        if source.calibration_note:
+        if source.calibration_note and not straight.array.calibration.given:
             text = f"{source.name}: {source.calibration_note}; nominal values stand in"
             warnings.warn(text, MvCodecWarning, stacklevel=2)
-        return _run(arguments, source, config, islice(source.frame_sets(), first, stop), view)
+        return _run(arguments, straight, config, islice(straight.frame_sets(), first, stop), view)
 
 
 def _run(
     arguments: argparse.Namespace,
-    source: Recording,
+    source: RectifiedStream,
     config: EncoderConfig,
     frame_sets: Iterator[FrameSet],
     view: LiveView | None,

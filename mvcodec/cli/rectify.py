@@ -111,7 +111,7 @@ def _calibrated(source: ArraySource, chosen: range, arguments: argparse.Namespac
     way = arguments.how or ("file" if arguments.calibration else "scene")
     if (way == "file") != bool(arguments.calibration):
         found = f"{len(arguments.calibration or [])} files with --from {way}"
-        raise SettingError("--calibration", found, "--from file, and the files of the cameras in row order")
+        raise SettingError("calibration", found, "--from file, and the files of the cameras in row order")
     wishes = Wishes(arguments.crop, arguments.size)
     if way == "file":
         return calibrate_from_files(source, chosen, arguments.calibration, wishes)

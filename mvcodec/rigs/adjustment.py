@@ -24,9 +24,12 @@ from mvcodec.rigs.features import Tracks
 
 Vectors = NDArray[np.float64]
 
-MOST_OBSERVATIONS = 9000
+_PLACE_KINDS = range(6, 9)
 _NEWTON_STEPS = 6
 _LOOSEST_RADIUS = 3.0
+_OBSERVATIONS = (1500, 2500, 6000, 6000)
+"""How many are looked at in each round, which is stricter than the one before."""
+_LEAST_NOISE_PX = 0.05
 _SHARED, _EACH = 4, 11
 _STEP = 1e-6
 
@@ -99,14 +102,6 @@ class Adjusted:
     inverse_depth: Vectors
 
 
-@dataclass(frozen=True, slots=True)
-class _Round:
-    """One round of the adjustment: the noise it reckons with, and how far off observations may be, px."""
-
-    noise_px: float
-    bound_px: float
-
-
 def scene_priors(array: CameraArray) -> Priors:
     """What is expected of an ordinary rig: a focal length that is given is good to some percent."""
     return Priors(focal=0.02) if array.calibration.given else Priors()
@@ -129,37 +124,34 @@ def adjust(
         priors: how sure all that is.
     """
     problem = _Problem(grid, size, focal_px, priors or Priors())
-    every = _thinned(tracks)
-    values, kept = np.zeros(problem.unknowns), every
-    step = _Round(2.0, 8.0)
-    for _ in range(_ROUNDS):
-        values = problem.solved(values, kept, step.noise_px)
-        kept = problem.agreeing(values, every, step.bound_px)
+    values = np.zeros(problem.unknowns)
+    noise_px, bound_px = 2.0, 8.0
+    for most in _OBSERVATIONS:
+        some = _thinned(tracks, most)
+        kept = problem.agreeing(values, some, bound_px) if most != _OBSERVATIONS[0] else some
+        values = problem.solved(values, kept, noise_px)
         residual, _ = problem.reprojected(problem.cameras(values), kept)
-        step = _next(residual[kept.seen], step)
-    residual, inverse_depth = problem.reprojected(problem.cameras(values), kept)
-    return Adjusted(problem.cameras(values), kept, residual, inverse_depth)
+        noise_px, bound_px = _stricter(residual[kept.seen], noise_px, bound_px)
+    cameras = problem.cameras(values)
+    kept = problem.agreeing(values, tracks, bound_px)
+    return Adjusted(cameras, kept, *problem.reprojected(cameras, kept))
 
 
-_ROUNDS = 4
-_LEAST_NOISE_PX = 0.05
-
-
-def _next(residual_px: Vectors, last: _Round) -> _Round:
-    """The next round: as strict as what is left allows, and at most three times as strict as the last."""
-    spread = 1.4826 * float(np.median(np.abs(residual_px))) if residual_px.size else last.noise_px
+def _stricter(residual_px: Vectors, noise_px: float, bound_px: float) -> tuple[float, float]:
+    """The noise to reckon with next and how far off observations may be: by what is left, but by steps."""
+    spread = 1.4826 * float(np.median(np.abs(residual_px))) if residual_px.size else noise_px
     noise = max(spread, _LEAST_NOISE_PX)
-    return _Round(max(noise, last.noise_px / 4), max(6 * noise, last.bound_px / 4))
+    return max(noise, noise_px / 4), max(6 * noise, bound_px / 4)
 
 
-def _thinned(tracks: Tracks) -> Tracks:
-    """Some of the points where there are many: those that most cameras see first."""
+def _thinned(tracks: Tracks, most: int) -> Tracks:
+    """Points with at most so many observations: those that most cameras see first."""
     lengths = tracks.seen.sum(axis=1)
-    if lengths.sum() <= MOST_OBSERVATIONS:
+    if lengths.sum() <= most:
         return tracks
     order = np.argsort(np.random.default_rng(0).uniform(0, 0.5, len(lengths)) - lengths)
     chosen = np.zeros(len(lengths), bool)
-    chosen[order[np.cumsum(lengths[order]) <= MOST_OBSERVATIONS]] = True
+    chosen[order[np.cumsum(lengths[order]) <= most]] = True
     return tracks.kept(tracks.seen & chosen[:, None])
 
 
@@ -174,7 +166,12 @@ class _Problem:
         self._heights = grid[:, 1] * bool(np.ptp(grid[:, 0]))
         p = priors
         self._shared = np.array([p.focal, p.k1, p.k2, p.stretch])
-        self._each = np.array([p.angle_rad] * 3 + [p.focal_each, p.k1_each, p.k2_each] + [p.place_steps] * 3 + [p.centre * size[0]] * 2)
+        self._each = np.array(
+            [p.angle_rad] * 3
+            + [p.focal_each, p.k1_each, p.k2_each]
+            + [p.place_steps] * 3
+            + [p.centre * size[0]] * 2
+        )
         self.unknowns = _SHARED + _EACH * self._count
         self._gauge = self._gauge_rows()
 
@@ -232,7 +229,7 @@ class _Problem:
             rho[:, :points] = 8 * (root - 1), 1 / root, -1 / (8 * root**3)
             return rho
 
-        found = least_squares(residuals, values, jacobian, loss=loss, max_nfev=25, ftol=1e-5, xtol=1e-6)
+        found = least_squares(residuals, values, jacobian, loss=loss, max_nfev=15, ftol=1e-4, xtol=1e-5)
         return np.asarray(found.x)
 
     def reprojected(self, cameras: Cameras, tracks: Tracks) -> tuple[Vectors, Vectors]:
@@ -251,7 +248,8 @@ class _Problem:
             ..., None
         ]
         rays = np.concatenate([places * factor, np.ones_like(factor)], axis=-1)
-        rays = np.einsum("nji,tnj->tni", Rotation.from_rotvec(cameras.turns).as_matrix(), rays)
+        turns = Rotation.from_rotvec(cameras.turns).as_matrix()
+        rays = (rays[:, :, None] @ turns)[:, :, 0]
         return rays[..., :2] / rays[..., 2:], cameras.focal_px[:, None] / np.maximum(factor, 1e-3)
 
     def _jacobian(self, values: Vectors, tracks: Tracks) -> Vectors:
@@ -271,7 +269,10 @@ class _Problem:
             stepped = values.copy()
             stepped[_SHARED:].reshape(self._count, _EACH)[:, kind] += _STEP
             after = self.cameras(stepped)
-            slopes_after, scales_after = self._slopes(after, tracks)
+            # Places move no ray.
+            slopes_after, scales_after = (
+                (slopes, scales_px) if kind in _PLACE_KINDS else self._slopes(after, tracks)
+            )
             towards = after.places - cameras.places
             lean = towards[:, :2] - slopes * towards[:, 2:]
             moved[..., kind] = (slopes_after - slopes + lean * depth[:, None, None]) / _STEP

@@ -64,8 +64,8 @@ class Calibrated:
         """One line for people."""
         after = self.rig.rectified
         return (
-            f"{self.rig.rows} x {self.rig.cols} cameras, rectified {after.width} x {after.height} px; rows apart"
-            f" {self.before.rows.text()} before, {self.after.rows.text()} after"
+            f"{self.rig.rows} x {self.rig.cols} cameras, rectified {after.width} x {after.height} px;"
+            f" rows apart {self.before.rows.text()} before, {self.after.rows.text()} after"
             f"; columns {self.before.columns.text()} before, {self.after.columns.text()} after"
         )
 

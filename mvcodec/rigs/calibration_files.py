@@ -115,7 +115,7 @@ def _euroc(path: Path, document: dict[str, Any]) -> KnownCamera:
 
 
 def _ros(path: Path, document: dict[str, Any]) -> KnownCamera:
-    """ROS: R takes directions in the camera's axes to those of the rectified pair, P's fourth column is -f B."""
+    """ROS: R takes directions in the camera's axes to those of the rectified pair; P has -f B."""
     size = tuple(_whole(path, document, key) for key in ("image_width", "image_height"))
     k = _matrix(path, document, "camera_matrix", (3, 3))
     coefficients = _matrix(path, document, "distortion_coefficients", None).ravel()

@@ -150,7 +150,7 @@ def find_tracks(
             counts[pair][0] += every
             counts[pair][1] += len(kept)
             links[pair] = kept
-        parts.append(_linked(order, found, links, number))
+        parts.append(linked(order, found, links, number))
     told = [PairCount(*pair, *counts[pair]) for pair in pairs]
     return _joined(order, parts), told
 
@@ -161,13 +161,13 @@ def _match_pair(one: Features, other: Features) -> tuple[int, NDArray[np.int64]]
     return len(pairs), pairs[agreeing(one.xy_px[pairs[:, 0]], other.xy_px[pairs[:, 1]])]
 
 
-def _linked(
+def linked(
     cameras: Sequence[Position],
     found: Mapping[Position, Features],
     links: Mapping[tuple[Position, Position], NDArray[np.int64]],
     frame: int,
 ) -> Tracks:
-    """Tracks of one frame set: features that matches join. One that a camera would see twice is none."""
+    """Tracks of one frame set: features that matches join. What a camera would see twice is none."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -47,7 +47,9 @@ def rig_from_cameras(
     positions = array.positions
     if len(known) != len(positions):
         found = f"{len(known)} cameras"
-        raise InputError(name, found, f"{len(positions)}, those of the {array.rows}x{array.cols} grid in row order")
+        raise InputError(
+            name, found, f"{len(positions)}, those of the {array.rows}x{array.cols} grid in row order"
+        )
     for camera in known:
         if camera.size != (array.width, array.height):
             found = "a camera of {}x{} px".format(*camera.size)
@@ -59,12 +61,15 @@ def rig_from_cameras(
     for position, camera in zip(positions, known, strict=True):
         place = axes @ (camera.centre_m - origin) / step_m
         expected = np.array([position[1], position[0] * rho, 0.0])
-        if np.abs(place - expected).max() > IRREGULAR_STEPS:
-            found = f"camera {position[0]},{position[1]} {np.abs(place - expected).max():.2f} steps beside its place"
+        beside = float(np.abs(place - expected).max())
+        if beside > IRREGULAR_STEPS:
+            found = f"camera {position[0]},{position[1]} {beside:.2f} steps beside its place"
             raise InputError(name, found, "cameras on a regular grid, in row order")
         cameras[position] = RigCamera(camera.lens, camera.turn @ axes.T, place, np.ones(3), np.zeros(3))
     focal = float(np.exp(np.mean([np.log(camera.lens.focal_px).mean() for camera in known])))
-    view = Rectified(array.width, array.height, focal, (0.0, 0.0), baseline_m=step_m, rho=rho, typical_w=typical_w)
+    view = Rectified(
+        array.width, array.height, focal, (0.0, 0.0), baseline_m=step_m, rho=rho, typical_w=typical_w
+    )
     source_size = array.width, array.height
     view = framed(cameras, source_size, view, crop, size)
     return Rig(array.rows, array.cols, source_size, cameras, view, found_by, {})

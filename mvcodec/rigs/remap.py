@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvcodec.array import CameraArray, Position
+from mvcodec.array import Position
 from mvcodec.capture.source import ArraySource
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FrameSet, Mask, Picture
@@ -97,13 +96,6 @@ def _table(camera: RigCamera) -> Picture | None:
         return None
     values = np.arange(256)[:, None] * camera.gain + camera.offset
     return np.clip(np.rint(values), 0, 255).astype(np.uint8)[None]
-
-
-class FrameSets(Protocol):
-    """Anything that has frame sets of an array."""
-
-    @property
-    def array(self) -> CameraArray: ...
 
 
 class RectifiedSource:

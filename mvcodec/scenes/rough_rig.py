@@ -137,7 +137,7 @@ class RoughScene:
     def __init__(
         self, room: RoomScene, cameras: Mapping[Position, RoughCamera], settings: RoughRigSettings
     ) -> None:
-        self._room, self.cameras, self.settings = room, dict(cameras), settings
+        self.room, self.cameras, self.settings = room, dict(cameras), settings
         self.frame_count = room.frame_count
         size = room.array.width, room.array.height
         self.array: CameraArray = replace(
@@ -160,16 +160,16 @@ class RoughScene:
             raise SettingError("viewpoint", f"{viewpoint.row:g},{viewpoint.col:g}", "the place of a camera")
         camera, (row, col) = self.cameras[position], position
         x, y, z = camera.offset_steps
-        ideal = self._room.array
+        ideal = self.room.array
         optics = Optics(ideal.width, ideal.height, ideal.calibration.fx_px * camera.focal_factor, camera.k1)
         place = (col + x, row + y, z)
-        picture, _ = self._room.look(place, frame - camera.late_frames, optics, camera.turn, camera.gain)
+        picture, _ = self.room.look(place, frame - camera.late_frames, optics, camera.turn, camera.gain)
         return picture, None
 
     def truth(self) -> dict[str, Any]:
         """What `rig_truth.json` states: every camera's flaws and optics, exactly."""
-        array, step_m = self.array, self._room.array.calibration.baseline_m
-        ideal = self._room.array.calibration
+        array, step_m = self.array, self.room.array.calibration.baseline_m
+        ideal = self.room.array.calibration
         cameras = {}
         for (row, col), camera in self.cameras.items():
             x, y, z = camera.offset_steps

@@ -1,0 +1,226 @@
+"""Measures `rectify` on rough sample rigs: angles, residuals, virtual views against rendered truth, time."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from mvcodec.array import CameraArray, Position, Viewpoint
+from mvcodec.capture import resolve_frames
+from mvcodec.evaluation.metrics import psnr
+from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture
+from mvcodec.kernels.raycast import straightened
+from mvcodec.layers.refinement import make_matcher
+from mvcodec.rigs.calibration import Calibrated, calibrate_from_scene
+from mvcodec.rigs.features import find_tracks
+from mvcodec.rigs.remap import RectifiedSource, Rectifier, source_places
+from mvcodec.rigs.residuals import Spread, residuals_of
+from mvcodec.rigs.rig import Rig
+from mvcodec.scenes.renderer import Optics
+from mvcodec.scenes.rough_rig import FLAWS, RoughCamera, RoughRigSettings, RoughScene
+from mvcodec.scenes.scene import RoomScene, SceneSettings
+from mvcodec.stereo.disparity_range import estimate_range
+from mvcodec.synthesis.synthesizers import make_synthesizer
+
+Vectors = NDArray[np.float64]
+FRAMES = 3
+VIEWS = {(2, 2): ((0.5, 0.5), (0.5, 0.0), (0.0, 0.5)), (3, 3): ((0.5, 0.5), (1.5, 0.5), (1.0, 1.5))}
+"""Virtual views that are looked at, in steps of each grid."""
+
+
+class SceneSource:
+    """An ArraySource over a scene, all of whose cameras are real. Each frame is rendered once."""
+
+    first_frame = 0
+    listed_real = None
+
+    def __init__(self, scene: RoomScene | RoughScene) -> None:
+        rows, cols = tuple(range(scene.array.rows)), tuple(range(scene.array.cols))
+        self.array: CameraArray = replace(scene.array, real_rows=rows, real_cols=cols)
+        self.name, self.frame_count = scene.array.name, scene.frame_count
+        self._scene = scene
+        self._rendered: dict[tuple[Position, int], Picture] = {}
+
+    def frame_sets(
+        self, frames: slice | None = None, views: Collection[Position] | None = None
+    ) -> Iterator[FrameSet]:
+        """See ArraySource."""
+        for frame in resolve_frames(frames, self.frame_count, self.name):
+            yield FrameSet(
+                frame, frame, {view: self._picture(view, frame) for view in views or self.array.real}
+            )
+
+    def truth(self, view: Position, frame: int) -> DisparityMap | None:
+        """See ArraySource."""
+        del view, frame
+        return None
+
+    def _picture(self, view: Position, frame: int) -> Picture:
+        if (view, frame) not in self._rendered:
+            self._rendered[view, frame] = self._scene.render(Viewpoint(*view), frame)[0]
+        return self._rendered[view, frame]
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Of one rough rig.
+
+    Attributes:
+        angle_deg: median error of the cameras' directions, up to one common rotation.
+        rows, columns: residuals of new matches in the rectified pictures.
+        views_db, ideal_db: mean luma PSNR of virtual views against rendered truth, and the ideal rig's.
+        cpu_s: of finding the rig, all threads.
+    """
+
+    seed: int
+    grid: str
+    angle_deg: float
+    rows: Spread
+    columns: Spread
+    views_db: float
+    ideal_db: float
+    cpu_s: float
+
+
+def angle_errors_deg(rig: Rig, truth: Mapping[Position, RoughCamera]) -> Vectors:
+    """(N,): how far each camera's direction is off, once one rotation of all is taken out."""
+    found = Rotation.from_matrix([camera.turn for camera in rig.cameras.values()])
+    true = Rotation.from_matrix([truth[at].turn for at in rig.cameras])
+    common = (found.inv() * true).mean()
+    return np.asarray(np.degrees((found * common * true.inv()).magnitude()))
+
+
+def measure(seed: int, grid: tuple[int, int], flaws: tuple[str, ...], ideal_db: float) -> Measured:
+    """One rough rig."""
+    scene = RoughScene.of(SceneSettings(grid, FRAMES), RoughRigSettings(seed, flaws))
+    source = SceneSource(scene)
+    list(source.frame_sets())
+    before = resource.getrusage(resource.RUSAGE_SELF)
+    found = calibrate_from_scene(source, range(FRAMES))
+    after = resource.getrusage(resource.RUSAGE_SELF)
+    straight = RectifiedSource(source, Rectifier(found.rig))
+    tracks, _ = find_tracks(list(straight.frame_sets(slice(1, 2))), straight.array.positions)
+    residuals = residuals_of(tracks, straight.array.rho)
+    return Measured(
+        seed,
+        f"{grid[0]}x{grid[1]}",
+        float(np.median(angle_errors_deg(found.rig, scene.cameras))),
+        residuals.rows,
+        residuals.columns,
+        _views_db(straight, scene, found),
+        ideal_db,
+        after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
+    )
+
+
+def ideal_db(grid: tuple[int, int]) -> float:
+    """Mean luma PSNR of the virtual views of the ideal rig."""
+    room = RoomScene(SceneSettings(grid, FRAMES))
+    decoded = _matched(SceneSource(room))
+    scores = [
+        _score(decoded, viewpoint, room.render(viewpoint, 1)[0], np.ones(3))
+        for viewpoint in _viewpoints(grid)
+    ]
+    return float(np.mean(scores))
+
+
+def _views_db(straight: RectifiedSource, scene: RoughScene, found: Calibrated) -> float:
+    decoded = _matched(straight)
+    optics, turn = true_rectified_camera(found.rig, scene)
+    gains = np.exp(
+        np.mean([np.log(scene.cameras[at].gain * found.rig.cameras[at].gain) for at in scene.cameras], axis=0)
+    )
+    scores = []
+    for viewpoint in _viewpoints((scene.array.rows, scene.array.cols)):
+        place = (viewpoint.col, viewpoint.row, 0.0)
+        truth, _ = scene.room.look(place, 1, optics, turn)
+        scores.append(_score(decoded, viewpoint, truth, gains))
+    return float(np.mean(scores))
+
+
+def true_rectified_camera(rig: Rig, scene: RoughScene) -> tuple[Optics, Vectors]:
+    """The camera of the room that sees what the rectified pictures show: best over all cameras."""
+    view = rig.rectified
+    y, x = np.mgrid[0 : view.height : 40j, 0 : view.width : 60j]
+    pixels = np.column_stack([x.ravel(), y.ravel()])
+    directions = []
+    focal = scene.array.width
+    centre = ((scene.array.width - 1) / 2, (scene.array.height - 1) / 2)
+    for at, camera in rig.cameras.items():
+        true = scene.cameras[at]
+        places = (source_places(camera, at, view, pixels) - centre) / (focal * true.focal_factor)
+        bent = np.array([straightened(x, y, true.k1, 0.0) for x, y in places])
+        directions.append(np.column_stack([bent, np.ones(len(bent))]) @ true.turn)
+
+    def camera_of(values: Vectors) -> tuple[float, Vectors, Vectors]:
+        return focal * np.exp(values[0]), values[1:3] * 100, Rotation.from_rotvec(values[3:]).as_matrix()
+
+    def apart(values: Vectors) -> Vectors:
+        focal_px, centre_px, turn = camera_of(values)
+        found = []
+        for direction in directions:
+            seen = direction @ turn.T
+            found.append(seen[:, :2] / seen[:, 2:] * focal_px + centre_px - pixels)
+        return np.concatenate(found).ravel()
+
+    start = np.array([0, *np.array(view.centre_px) / 100, 0, 0, 0])
+    focal_px, centre_px, turn = camera_of(least_squares(apart, start, x_scale="jac").x)
+    principal = float(centre_px[0]), float(centre_px[1])
+    return Optics(view.width, view.height, float(focal_px), principal_px=principal), turn
+
+
+def _viewpoints(grid: tuple[int, int]) -> list[Viewpoint]:
+    return [Viewpoint(row, col) for row, col in VIEWS[grid]]
+
+
+def _matched(source: SceneSource | RectifiedSource) -> DecodedSet:
+    array = source.array
+    (frame_set,) = source.frame_sets(slice(1, 2))
+    range_px = estimate_range(array, [frame_set], None)
+    maps = make_matcher("joint").match(array, frame_set.pictures, range_px)
+    return DecodedSet(array, 1, 1, frame_set.pictures, maps, range_px)
+
+
+def _score(decoded: DecodedSet, viewpoint: Viewpoint, truth: Picture, gains: Vectors) -> float:
+    view = make_synthesizer("layered").render(decoded, viewpoint).pixels
+    lit = np.clip(np.rint(truth * gains), 0, 255).astype(np.uint8)
+    return psnr(lit, view)
+
+
+def main() -> None:
+    """Print a table, or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--grids", nargs="+", default=["2x2", "3x3"])
+    parser.add_argument("--flaws", nargs="+", default=list(FLAWS), choices=FLAWS)
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    rows: list[dict[str, Any]] = []
+    for text in arguments.grids:
+        grid = int(text.split("x")[0]), int(text.split("x")[1])
+        best = ideal_db(grid)
+        for seed in range(1, arguments.seeds + 1):
+            measured = measure(seed, grid, tuple(arguments.flaws), best)
+            rows.append(asdict(measured))
+            if not arguments.json:
+                print(
+                    f"{text} seed {seed}: angles {measured.angle_deg:.3f} deg, rows {measured.rows.text()},"
+                    f" columns {measured.columns.text()}, views {measured.views_db:.2f} dB"
+                    f" (ideal {best:.2f}), {measured.cpu_s:.1f} s of CPU",
+                    flush=True,
+                )
+    if arguments.json:
+        print(json.dumps(rows, indent=2))
+
+
+if __name__ == "__main__":
+    main()
