@@ -59,6 +59,11 @@ class SceneSource:
                 frame, frame, {view: self._picture(view, frame) for view in views or self.array.real}
             )
 
+    def has_given(self, view: Position) -> bool:
+        """See ArraySource."""
+        del view
+        return False
+
     def truth(self, view: Position, frame: int) -> DisparityMap | None:
         """See ArraySource."""
         del view, frame

@@ -122,6 +122,11 @@ class RectifiedSource:
         for frame_set in self._source.frame_sets(frames, views):
             yield rectified(frame_set, self._rectifier)
 
+    def has_given(self, view: Position) -> bool:
+        """See ArraySource: maps belong to the pictures as they were."""
+        del view
+        return False
+
     def truth(self, view: Position, frame: int) -> DisparityMap | None:
         """See ArraySource: nobody knows it of a rig's pictures."""
         del view, frame
