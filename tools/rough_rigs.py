@@ -42,6 +42,7 @@ class SceneSource:
 
     first_frame = 0
     listed_real = None
+    has_given = False
 
     def __init__(self, scene: RoomScene | RoughScene) -> None:
         rows, cols = tuple(range(scene.array.rows)), tuple(range(scene.array.cols))
@@ -58,11 +59,6 @@ class SceneSource:
             yield FrameSet(
                 frame, frame, {view: self._picture(view, frame) for view in views or self.array.real}
             )
-
-    def has_given(self, view: Position) -> bool:
-        """See ArraySource."""
-        del view
-        return False
 
     def truth(self, view: Position, frame: int) -> DisparityMap | None:
         """See ArraySource."""

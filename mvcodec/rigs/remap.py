@@ -113,6 +113,8 @@ class RectifiedSource:
         self.array = rectifier.rig.array(source.array)
         self.name, self.frame_count = source.name, source.frame_count
         self.first_frame, self.listed_real = source.first_frame, source.listed_real
+        # Maps belong to the pictures as they were.
+        self.has_given = False
         self._source, self._rectifier = source, rectifier
 
     def frame_sets(
@@ -121,11 +123,6 @@ class RectifiedSource:
         """See ArraySource."""
         for frame_set in self._source.frame_sets(frames, views):
             yield rectified(frame_set, self._rectifier)
-
-    def has_given(self, view: Position) -> bool:
-        """See ArraySource: maps belong to the pictures as they were."""
-        del view
-        return False
 
     def truth(self, view: Position, frame: int) -> DisparityMap | None:
         """See ArraySource: nobody knows it of a rig's pictures."""
