@@ -114,8 +114,8 @@ def rectified_stream(source: Recording, arguments: argparse.Namespace) -> Rectif
     elif any(not camera.is_straight for camera in source.cameras.values()):
         bent = next(camera.frame for camera in source.cameras.values() if not camera.is_straight)
         text = (
-            f"{source.name}: the calibration of frame {bent!r} has lens distortion, or differs between K and"
-            f" P; its pictures are taken as rectified already. If they are not: --rig {RECORDED}"
+            f"{source.name}: the calibration of frame {bent!r} has lens distortion (D) or is turned (R); its"
+            f" pictures are taken as rectified already. If they are not: --rig {RECORDED}"
         )
         warnings.warn(text, MvCodecWarning, stacklevel=2)
     return RectifiedStream(source, None if rig is None else Rectifier(rig), strict=arguments.strict)
