@@ -4,7 +4,7 @@ import type { Header } from "../container/header.ts";
 import { cellRho, clampView, steps, type Viewpoint } from "../geometry.ts";
 import type { CameraFrame } from "../synthesis/camera_textures.ts";
 import type { ViewRenderer } from "../synthesis/renderer.ts";
-import type { Shown } from "./engine.ts";
+import type { Shown } from "./shown.ts";
 
 export const EYE_MODES = ["one", "side by side", "anaglyph"] as const;
 

@@ -9,11 +9,13 @@ import { FrameStore } from "../decode/frame_store.ts";
 import { smallPicture } from "../decode/planes.ts";
 import { clampView, contributors, infinityOf, nearestCamera, type Camera, type Viewpoint } from "../geometry.ts";
 import type { CameraFrame } from "../synthesis/camera_textures.ts";
-import { ViewRenderer, type Look, type Pixels } from "../synthesis/renderer.ts";
-import { apertureOf, drawShown, eyesOf, type Eyes } from "./drawing.ts";
+import { ViewRenderer, type Pixels } from "../synthesis/renderer.ts";
+import { apertureOf, drawShown, eyesOf } from "./drawing.ts";
 import { Playback } from "./playback.ts";
+import type { Shown } from "./shown.ts";
 import { Tempo } from "./tempo.ts";
 
+/** Told to whoever shows the controls. */
 export interface EngineEvents {
   /** Another picture is on the screen. */
   onFrame(): void;
@@ -23,20 +25,6 @@ export interface EngineEvents {
   onWaiting(isWaiting: boolean): void;
   /** Something is wrong with the file; it goes on where `isFatal` is false. */
   onTrouble(text: string, isFatal: boolean): void;
-}
-
-/** What is asked of the engine to show. */
-export interface Shown {
-  frame: number;
-  view: Viewpoint;
-  look: Look;
-  /** See `ViewSettings.dolly`. */
-  dolly: number;
-  eyes: Eyes;
-  /** See `ViewSettings.wipe`. */
-  wipe: number;
-  /** Disparity that is in focus, px; undefined: everything is. */
-  focus: number | undefined;
 }
 
 interface Decoded {

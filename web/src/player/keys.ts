@@ -1,6 +1,8 @@
 /** Which key does what; `KEYS` of the texts lists them for people. */
 
+import { button, element } from "./dom.ts";
 import { SPEEDS } from "./playback.ts";
+import { KEYS, TEXTS } from "./texts.ts";
 import type { Ui } from "./ui.ts";
 
 export function keyActions(ui: Ui): ReadonlyMap<string, () => void> {
@@ -37,4 +39,16 @@ export function keyActions(ui: Ui): ReadonlyMap<string, () => void> {
     ["i", () => ui.toggleStatistics()],
     ["?", () => ui.showHelp()],
   ]);
+}
+
+/** The dialog that lists the keys. */
+export function keyList(): HTMLDialogElement {
+  const dialog = element("dialog", { "aria-label": TEXTS.help });
+  const list = element("dl");
+  for (const [keys, text] of KEYS) {
+    list.append(element("dt", {}, ...keys.split(" ").map((key) => element("kbd", {}, key))), element("dd", {}, text));
+  }
+  const close = button(TEXTS.close, TEXTS.close, () => dialog.close());
+  dialog.append(element("form", {}, element("h2", {}, TEXTS.help), close), list);
+  return dialog;
 }

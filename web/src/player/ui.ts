@@ -7,12 +7,12 @@ import { button, element, icon } from "./dom.ts";
 import { EYE_MODES } from "./drawing.ts";
 import type { Engine } from "./engine.ts";
 import { Gestures } from "./gestures.ts";
-import { keyActions } from "./keys.ts";
+import { keyActions, keyList } from "./keys.ts";
 import { Looking } from "./looking.ts";
 import { Section, type Mark } from "./section.ts";
 import { statistics } from "./statistics.ts";
 import { linkTo, saveClip, savePicture } from "./take_away.ts";
-import { KEYS, TEXTS } from "./texts.ts";
+import { TEXTS } from "./texts.ts";
 
 /** Controls hide when nothing happens for so long. */
 const IDLE_MS = 3000;
@@ -31,7 +31,7 @@ export class Ui {
   readonly #stats = element("pre", { class: "stats", hidden: true });
   readonly #probe = element("p", { class: "probe", hidden: true });
   readonly #spoken = element("p", { class: "unseen", role: "status" });
-  readonly #dialog = element("dialog", { "aria-label": TEXTS.help });
+  readonly #dialog = keyList();
   readonly #file = element("input", { type: "file", accept: ".mcap", hidden: true });
   readonly #poster = element("img", { class: "poster", alt: "", hidden: true });
   readonly controls: Controls;
@@ -57,7 +57,6 @@ export class Ui {
     const middle = element("div", { class: "middle" }, this.#wait, this.#big);
     root.append(this.#stage, middle, this.#hint, this.#stats, this.#probe, this.controls.bar, this.controls.menu,
       this.#notice, this.#spoken, this.#dialog, this.#file);
-    this.#makeDialog();
   }
 
   connect(): void {
@@ -289,15 +288,6 @@ export class Ui {
       showHelp: () => this.showHelp(),
       peek: async (seconds: number) => this.#engine?.peek(seconds, PEEK_PX),
     };
-  }
-
-  #makeDialog(): void {
-    const close = button(TEXTS.close, TEXTS.close, () => this.#dialog.close());
-    const list = element("dl");
-    for (const [keys, text] of KEYS) {
-      list.append(element("dt", {}, ...keys.split(" ").map((key) => element("kbd", {}, key))), element("dd", {}, text));
-    }
-    this.#dialog.append(element("form", {}, element("h2", {}, TEXTS.help), close), list);
   }
 
   #hover(at: { x: number; y: number } | undefined): void {
