@@ -99,6 +99,11 @@ class VideoDecoder:
         self._count += 1
         return shown + self._decode(self._context, packet, message)
 
+    def lose(self, why: str) -> None:
+        """A message never came, or not whole: what builds on it is left out, up to the next keyframe."""
+        self._whole.lose(why)
+        self._left_out = True
+
     def flush(self) -> list[ShownPicture]:
         """The pictures that are left inside."""
         context, self._context = self._context, None

@@ -49,7 +49,8 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--speed",
         choices=SPEEDS,
-        help=f"sets --matcher and --preset together (default: {FOR_FILES}; of standard input: {FOR_LIVE})",
+        help=f"sets --matcher and --preset together (default: {FOR_FILES}; of standard input and live"
+        f" cameras: {FOR_LIVE})",
     )
     parser.add_argument(
         "--codec",

@@ -27,6 +27,7 @@ from mvcodec.cli.encode_stream import (
 from mvcodec.cli.info import document, simulcast_bits, summary
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.layer_options import add_layer, layer_settings
+from mvcodec.cli.live_options import input_or_camera, is_live
 from mvcodec.cli.live_view_option import add_live_view, live_view
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.picture_options import add_picture_options, reading_of
@@ -55,8 +56,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     default = EncoderConfig()
     add_input(
         parser,
-        "an array folder, R*C videos in row order with --grid, or a recording with --topics: an .mcap"
-        " file or - for standard input",
+        "an array folder, R*C videos in row order with --grid, a recording with --topics (an .mcap"
+        " file or - for standard input), or R*C live cameras with --grid: udp://, rtsp://, srt://, tcp://,"
+        " v4l2:DEVICE, avfoundation:DEVICE",
+        input_or_camera,
     )
     parser.add_argument("output", type=local_path, metavar="OUT.mcap", help="or - for standard output")
     rate = parser.add_mutually_exclusive_group()
@@ -216,7 +219,7 @@ def _encode(
 def _check_output(output: Path, inputs: Sequence[Path], *, overwrite: bool) -> None:
     if str(output) == STANDARD:
         return
-    if output.resolve() in [path.resolve() for path in inputs]:
+    if output.resolve() in [Path(path).resolve() for path in inputs]:
         raise SettingError("OUT", output, "another file than INPUT")
     if output.suffix.lower() != SUFFIX:
         # It would most likely be the last INPUT, with OUT forgotten.
@@ -226,7 +229,7 @@ def _check_output(output: Path, inputs: Sequence[Path], *, overwrite: bool) -> N
 
 def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
     """The settings, checked against the array before the time-consuming part begins."""
-    if arguments.speed is None and str(arguments.input[0]) == STANDARD:
+    if arguments.speed is None and (is_live(arguments) or str(arguments.input[0]) == STANDARD):
         arguments.speed = FOR_LIVE
     if arguments.depth:
         require_calibration(array, arguments.nominal)

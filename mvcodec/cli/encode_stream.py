@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import BinaryIO, get_args
 
 from mvcodec.array import CameraArray
+from mvcodec.capture.live_cameras import LiveCameras
 from mvcodec.capture.manifest import read_calibration
 from mvcodec.capture.recording import Recording
 from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.cli.interrupt import deferred_interrupt
+from mvcodec.cli.live_options import PATIENCE, add_patience, is_live, live_cameras
 from mvcodec.cli.live_view_option import live_view
 from mvcodec.cli.picture_options import reading_of
 from mvcodec.cli.progress import progress
@@ -36,7 +38,7 @@ from mvcodec.output.live_view import LiveView
 
 SUFFIX = ".mcap"
 
-STREAM_OPTIONS = ("--topics", "--when-behind", "--clock")
+STREAM_OPTIONS = ("--topics", "--when-behind", "--clock", PATIENCE)
 DEFAULT_WHEN_BEHIND: WhenBehind = "block"
 DEFAULT_CLOCK: Clock = "stamp"
 
@@ -62,9 +64,10 @@ def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--clock",
         choices=get_args(Clock),
-        help="the times that count: the messages' own stamps, or when they were written down"
-        f" (default: {DEFAULT_CLOCK})",
+        help="the times that count: the pictures' own stamps, or when they were written down or arrived"
+        f" (default: {DEFAULT_CLOCK}; of live cameras: {DEFAULT_CLOCK} where they seem to have one clock)",
     )
+    add_patience(group)
 
 
 def own_file(arguments: argparse.Namespace) -> Path | None:
@@ -77,11 +80,11 @@ def own_file(arguments: argparse.Namespace) -> Path | None:
 def is_stream(arguments: argparse.Namespace) -> bool:
     """Whether the input is a recording (in one file or several) or a stream; files of ours are neither."""
     inputs: list[Path] = arguments.input
+    if is_live(arguments) or [str(path) for path in inputs] == [STANDARD]:
+        return True
     if own_file(arguments) is not None:
         return False
-    return [str(path) for path in inputs] == [STANDARD] or all(
-        path.suffix.lower() == SUFFIX for path in inputs
-    )
+    return all(path.suffix.lower() == SUFFIX for path in inputs)
 
 
 def refuse_stream_options(arguments: argparse.Namespace) -> None:
@@ -89,7 +92,9 @@ def refuse_stream_options(arguments: argparse.Namespace) -> None:
     for option in STREAM_OPTIONS:
         found = getattr(arguments, option.removeprefix("--").replace("-", "_"))
         if found is not None:
-            expected = f"no such option: {arguments.input[0]} is no recording, an {SUFFIX} file or -"
+            expected = (
+                f"no such option: {arguments.input[0]} is no recording, live camera, {SUFFIX} file or -"
+            )
             raise SettingError(option, found, expected)
 
 
@@ -150,7 +155,11 @@ def _run(
 
 
 @contextmanager
-def _opened(arguments: argparse.Namespace) -> Iterator[Recording]:
+def _opened(arguments: argparse.Namespace) -> Iterator[Recording | LiveCameras]:
+    if is_live(arguments):
+        with live_cameras(arguments) as cameras:
+            yield cameras
+        return
     if arguments.split is not None:
         raise SettingError("split", "with a recording", "an input of video or picture files")
     if arguments.sync is not None:

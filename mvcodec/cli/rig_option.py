@@ -10,6 +10,7 @@ from pathlib import Path
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.capture import ArraySource
+from mvcodec.capture.live_cameras import LiveCameras
 from mvcodec.capture.recording import Recording
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet, Picture
@@ -78,7 +79,7 @@ class RectifiedStream:
         strict: as in `look`.
     """
 
-    def __init__(self, source: Recording, rectifier: Rectifier | None, *, strict: bool) -> None:
+    def __init__(self, source: Recording | LiveCameras, rectifier: Rectifier | None, *, strict: bool) -> None:
         self.name = source.name
         self.array = source.array if rectifier is None else rectifier.rig.array(source.array)
         self._source, self._rectifier, self._strict = source, rectifier, strict
@@ -96,7 +97,7 @@ class RectifiedStream:
             yield straight
 
 
-def rectified_stream(source: Recording, arguments: argparse.Namespace) -> RectifiedStream:
+def rectified_stream(source: Recording | LiveCameras, arguments: argparse.Namespace) -> RectifiedStream:
     """A recording, rectified as ``--rig`` says.
 
     Raises:

@@ -105,6 +105,8 @@ def _messages(schema: MessageSchema, data: bytes) -> Iterator[Any]:
                 frame_id=message.header.frame_id,
                 width=message.width,
                 height=message.height,
+                distortion_model=message.distortion_model,
+                D=message.d,
                 K=message.k,
                 R=message.r,
                 P=message.p,

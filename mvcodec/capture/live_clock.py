@@ -1,0 +1,44 @@
+"""Times of live pictures: the sender's stamps, and what their arrival says about the sender's clock."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+_WINDOW = 1000
+"""Pictures after which an early arrival is forgotten, since the sender's clock runs at a speed of its own."""
+
+AGREE_NS = 2_000_000_000
+"""Clocks of senders that are no further apart are taken as one; a network and its buffers delay by less."""
+
+
+class ArrivalClock:
+    """Follows the least delay between a picture's stamp and its arrival.
+
+    The least one: what comes later was delayed on the way, which says nothing of when it was taken.
+    """
+
+    def __init__(self) -> None:
+        self.began_s = time.monotonic()
+        self._count = 0
+        self._now: int | None = None
+        self._before: int | None = None
+
+    def push(self, stamp_ns: int, arrival_ns: int) -> None:
+        """Take a picture into account."""
+        if self._count % _WINDOW == 0:
+            self._before, self._now = self._now, None
+        self._count += 1
+        delay = arrival_ns - stamp_ns
+        self._now = delay if self._now is None else min(self._now, delay)
+
+    @property
+    def shift_ns(self) -> int | None:
+        """What makes a time of day of a stamp; None before the first picture."""
+        known = [delay for delay in (self._now, self._before) if delay is not None]
+        return min(known, default=None)
+
+
+def common_clock(shifts_ns: Sequence[int]) -> bool:
+    """Whether several senders stamp by one clock, as far as arrivals tell."""
+    return max(shifts_ns) - min(shifts_ns) <= AGREE_NS

@@ -1,0 +1,77 @@
+"""Live cameras as the input of ``encode``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from mvcodec.capture.live_address import is_live_address
+from mvcodec.capture.live_cameras import LiveCameras, LiveSettings
+from mvcodec.capture.manifest import read_calibration
+from mvcodec.cli.paths import local_path
+from mvcodec.cli.time_options import timing_of
+from mvcodec.errors import SettingError
+
+PATIENCE = "--patience"
+DEFAULT_PATIENCE_S = 10.0
+
+
+def input_or_camera(text: str) -> Path | str:
+    """A path, or the address of a live camera as it stands."""
+    return text if is_live_address(text) else local_path(text)
+
+
+def is_live(arguments: argparse.Namespace) -> bool:
+    """Whether the input is live cameras.
+
+    Raises:
+        SettingError: some are, and some are not.
+    """
+    live = [isinstance(name, str) for name in arguments.input]
+    if any(live) and not all(live):
+        raise SettingError("INPUT", "live cameras and files", "one or the other")
+    return all(live)
+
+
+def add_patience(group: argparse._ArgumentGroup) -> None:
+    """``--patience``."""
+    group.add_argument(
+        PATIENCE,
+        type=float,
+        metavar="S",
+        help="how long nothing may come from live cameras before encoding ends, seconds; until then they"
+        f" are opened again (default: {DEFAULT_PATIENCE_S:g})",
+    )
+
+
+@contextmanager
+def live_cameras(arguments: argparse.Namespace) -> Iterator[LiveCameras]:
+    """The opened cameras.
+
+    Raises:
+        SettingError: options that don't fit them.
+        InputError: nothing comes.
+    """
+    for option in ("topics", "split", "bits", "sync"):
+        found = getattr(arguments, option)
+        if found is not None:
+            raise SettingError(f"--{option}", found, "no such option with live cameras")
+    count = len(arguments.input)
+    if arguments.grid is None and count > 1:
+        raise SettingError("--grid", "nothing", f"RxC of {count} cameras in row order")
+    timing = timing_of(arguments)
+    settings = LiveSettings(
+        addresses=tuple(arguments.input),
+        grid=arguments.grid or (1, 1),
+        real=arguments.real,
+        fps=timing.fps,
+        tolerance_ms=timing.tolerance_ms,
+        calibration=None if arguments.calibration is None else read_calibration(arguments.calibration),
+        clock=arguments.clock,
+        offsets_ms=timing.offsets_ms,
+        patience_s=DEFAULT_PATIENCE_S if arguments.patience is None else arguments.patience,
+    )
+    with closing(LiveCameras(settings)) as cameras:
+        yield cameras

@@ -1,0 +1,190 @@
+"""Live cameras over UDP on this machine: paired by when pictures were taken, with delays and losses."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+import warnings
+from collections.abc import Callable
+from contextlib import ExitStack, closing
+from itertools import islice, pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import COMMAND, fails
+from live_senders import FPS, NUMBERS, Sender, Server, free_port
+from timed_videos import number_of, numbered
+
+from mvcodec.capture.live_address import how_to_open, is_live_address
+from mvcodec.capture.live_cameras import LiveCameras, LiveSettings
+from mvcodec.capture.live_clock import ArrivalClock, common_clock
+from mvcodec.container import read_info
+from mvcodec.errors import InputError, SettingError
+
+Taken = tuple[list[list[int]], list[int], list[str]]
+
+
+def taken(count: int, *senders: dict[str, Any], **settings: Any) -> Taken:
+    """Numbers of the pictures of frame sets, their times, what is told; checks that pictures are whole."""
+    ports = [free_port() for _ in senders]
+    addresses = tuple(f"udp://127.0.0.1:{port}" for port in ports)
+    start_s = time.monotonic()
+    numbers, times = [], []
+    with ExitStack() as stack, warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for col, (port, options) in enumerate(zip(ports, senders, strict=True)):
+            stack.enter_context(Sender(port, col, start_s, **options))
+        cameras = stack.enter_context(
+            closing(LiveCameras(LiveSettings(addresses, (1, len(ports)), **settings)))
+        )
+        for item in islice(cameras.frame_sets(), count):
+            shown = [number_of(picture) for picture in item.pictures.values()]
+            for number, ((_, col), picture) in zip(shown, item.pictures.items(), strict=True):
+                assert np.abs(picture.astype(int) - numbered(number, col)).mean() < 6, "a whole picture"
+            numbers.append(shown)
+            times.append(item.time_ns)
+    return numbers, times, [str(warning.message) for warning in caught]
+
+
+def together(numbers: list[list[int]]) -> bool:
+    return all(len(set(found)) == 1 for found in numbers)
+
+
+def test_a_delay_on_the_way_does_not_matter() -> None:
+    numbers, times, told = taken(30, {}, {"delay_s": 0.25})
+    assert together(numbers)
+    assert all((b[0] - a[0]) % NUMBERS == 1 for a, b in pairwise(numbers))
+    assert np.diff(times) == pytest.approx(1e9 / FPS, rel=0.01)
+    assert abs(times[-1] - time.time_ns()) < 20e9, "times of day"
+    assert any("paired by their stamps" in text for text in told)
+
+
+def test_clocks_that_begin_anywhere_are_paired_by_arrival() -> None:
+    numbers, _, told = taken(30, {}, {"first_s": 500.0})
+    assert together(numbers)
+    assert any("paired by arrival" in text for text in told)
+
+
+def test_only_whole_pictures_come_through_losses() -> None:
+    def lost(number: int, place: int) -> bool:
+        return number % 11 == 5 and place == 0
+
+    numbers, _, _ = taken(40, {}, {"lost": lost})
+    assert together(numbers)
+    found = {shown[0] for shown in numbers}
+    assert len(found) >= 20, "keyframes heal what was lost"
+
+
+def test_a_camera_that_was_away_comes_back() -> None:
+    numbers, times, _ = taken(110, {}, {"away": range(70, 100)})
+    assert together(numbers)
+    assert max(np.diff(times)) > 0.9e9, "the gap is one in the times too"
+
+
+def test_a_camera_that_breaks_off_is_opened_again() -> None:
+    with ExitStack() as stack, warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        start_s = time.monotonic()
+        server = stack.enter_context(Server(1, start_s, each=45))
+        port = free_port()
+        stack.enter_context(Sender(port, 0, start_s))
+        addresses = (f"udp://127.0.0.1:{port}", f"tcp://127.0.0.1:{server.port}")
+        cameras = stack.enter_context(closing(LiveCameras(LiveSettings(addresses, (1, 2)))))
+        shown = []
+        for item in islice(cameras.frame_sets(), 80):
+            shown.append([number_of(picture) for picture in item.pictures.values()])
+    assert together(shown)
+    assert server.connections >= 2
+    assert any("broke off" in str(warning.message) for warning in caught)
+
+
+def test_a_silent_camera_is_named_after_a_while() -> None:
+    with pytest.raises(InputError, match=r"udp://127.0.0.1:\d+: found no whole picture for 1.5 s"):
+        taken(1, {}, {"away": range(10**6)}, patience_s=1.5)
+
+
+def test_the_command_ends_with_ctrl_c_and_its_file_is_whole(tmp_path: Path) -> None:
+    ports, out = [free_port(), free_port()], tmp_path / "out.mcap"
+    addresses = [f"udp://127.0.0.1:{port}" for port in ports]
+    options = ["--grid", "1x2", "--disparity-range", "0,8", "--chunk-ms", "0"]
+    start_s = time.monotonic()
+    with Sender(ports[0], 0, start_s), Sender(ports[1], 1, start_s, delay_s=0.1):
+        with subprocess.Popen(
+            [*COMMAND, "encode", *addresses, str(out), *options], stderr=subprocess.PIPE
+        ) as run:
+            wait_for(lambda: run.poll() is not None or size_of(tmp_path) > 8_000)
+            run.send_signal(signal.SIGINT)
+            assert run.stderr is not None
+            told = run.stderr.read().decode()
+        assert run.returncode == 0, told
+    assert "Traceback" not in told
+    assert read_info(out).frames > 5
+
+
+def size_of(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+def wait_for(happened: Callable[[], bool], at_most_s: float = 90.0) -> None:
+    """Wait for something, looking again and again."""
+    end_s = time.monotonic() + at_most_s
+    while not happened():
+        assert time.monotonic() < end_s, "it never happened"
+        time.sleep(0.05)
+
+
+def test_addresses_are_told_from_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for address in ("udp://@:5000", "rtsp://cam/1", "srt://h:1?mode=caller", "tcp://h:1", "v4l2:/dev/video0"):
+        assert is_live_address(address)
+    assert is_live_address("avfoundation:0")
+    for name in ("cam:1.mp4", "http://x/y.mcap", "udp:x", "a/v4l2", "room"):
+        assert not is_live_address(name)
+    Path("v4l2:x").touch()
+    assert not is_live_address("v4l2:x"), "a file of that name comes first"
+    assert (how_to_open("v4l2:/dev/video0").file, how_to_open("v4l2:/dev/video0").form) == (
+        "/dev/video0",
+        "v4l2",
+    )
+    assert how_to_open("RTSP://cam/1").options["rtsp_transport"] == "tcp"
+
+
+def test_the_least_delay_counts_and_is_forgotten_after_a_while() -> None:
+    clock = ArrivalClock()
+    assert clock.shift_ns is None
+    for number, late in enumerate([30, 10, 50]):
+        clock.push(number * 1000, number * 1000 + 700 + late)
+    assert clock.shift_ns == 710
+    for number in range(3, 2100):
+        clock.push(number * 1000, number * 1000 + 900)
+    assert clock.shift_ns == 900
+    assert common_clock([0, 10**9])
+    assert not common_clock([0, 3 * 10**9])
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"grid": (2, 2)}, "grid: found 2x2, expected a grid of 2 cameras"),
+        ({"addresses": ("udp://a", "udp://a")}, "INPUT: found an address twice"),
+        ({"patience_s": 0}, "patience_s: found 0"),
+        ({"offsets_ms": {"udp://z": 1.0}}, "offsets_ms: found udp://z"),
+    ],
+)
+def test_settings_that_do_not_fit(changes: dict[str, Any], told: str) -> None:
+    with pytest.raises(SettingError, match=told):
+        LiveSettings(**{"addresses": ("udp://a", "udp://b"), "grid": (1, 2), **changes})
+
+
+def test_options_that_do_not_fit_live_cameras(tmp_path: Path) -> None:
+    out = tmp_path / "out.mcap"
+    address = "udp://127.0.0.1:9"
+    assert "--topics" in fails(2, "encode", address, out, "--topics", "/a")
+    assert "--grid" in fails(2, "encode", address, "udp://127.0.0.1:10", out)
+    assert "live cameras and files" in fails(2, "encode", address, "x.mp4", out, "--grid", "1x2")
+    line = fails(1, "encode", address, out, "--patience", "0.5")
+    assert "found no whole picture for 0.5 s" in line
+    assert not out.exists()
