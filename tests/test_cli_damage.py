@@ -80,7 +80,7 @@ def test_json_says_how_much_of_a_file_was_read(file: bytes, tmp_path: Path, form
     report = json.loads(succeeds(*arguments))
     assert (report["frames"], report["bytes"]) == (COUNT, len(file))
     assert len(file) / 2 < report["bytes_read"] <= 2 * len(file)
-    part = json.loads(succeeds(*arguments, "--frames", ":2"))
+    part = json.loads(succeeds(*arguments, "--frames", ":2", "-y"))
     assert part["frames"] == 2
     assert part["bytes_read"] < report["bytes_read"]
 
@@ -97,7 +97,7 @@ def test_json_comes_before_the_line_about_damage(flipped: Path, cut: Path, tmp_p
 
 
 def test_damage_is_skipped_where_that_is_asked_for(flipped: Path, tmp_path: Path) -> None:
-    done = mvcodec("decode", flipped, tmp_path / "out", "--on-error", "skip")
+    done = mvcodec("decode", flipped, tmp_path / "out", "--on-error", "skip", "--quiet")
     assert done.returncode == 0
     (line,) = done.stderr.splitlines()
     assert line.startswith("mvcodec: warning: ")
@@ -106,7 +106,7 @@ def test_damage_is_skipped_where_that_is_asked_for(flipped: Path, tmp_path: Path
 
 
 def test_a_cut_file_decodes_with_one_warning(cut: Path, tmp_path: Path) -> None:
-    done = mvcodec("decode", cut, tmp_path / "out")
+    done = mvcodec("decode", cut, tmp_path / "out", "--quiet")
     assert done.returncode == 0
     (line,) = done.stderr.splitlines()
     assert "cut off after" in line
@@ -167,7 +167,7 @@ def test_render_stops_at_damage_or_goes_on_behind_it(flipped: Path, tmp_path: Pa
     arguments = ("render", flipped, tmp_path / "x.gif", *QUICK)
     assert "at 1.000..1.400 s: found damage" in fails(1, *arguments)
     assert not (tmp_path / "x.gif").exists()
-    done = mvcodec(*arguments, "--on-error", "skip")
+    done = mvcodec(*arguments, "--on-error", "skip", "--quiet")
     assert done.returncode == 0
     (line,) = done.stderr.splitlines()
     assert line.startswith("mvcodec: warning: ")
@@ -177,7 +177,7 @@ def test_render_stops_at_damage_or_goes_on_behind_it(flipped: Path, tmp_path: Pa
 
 def test_follow_reads_a_file_while_it_grows(file: bytes, tmp_path: Path) -> None:
     growing = tmp_path / "growing.mcap"
-    arguments = ["decode", str(growing), str(tmp_path / "out"), "--follow"]
+    arguments = ["decode", str(growing), str(tmp_path / "out"), "--follow", "--quiet"]
     reader = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE)
     try:
         with growing.open("wb", buffering=0) as target:
@@ -198,7 +198,7 @@ def test_follow_reads_a_file_while_it_grows(file: bytes, tmp_path: Path) -> None
 
 
 def test_follow_ends_with_what_is_there_at_ctrl_c(cut: Path, tmp_path: Path) -> None:
-    arguments = ["decode", str(cut), str(tmp_path / "out"), "--follow"]
+    arguments = ["decode", str(cut), str(tmp_path / "out"), "--follow", "--quiet"]
     reader = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, text=True)
     try:
         last = tmp_path / "out" / "r00_c00" / f"{2 * GOP - 1:06d}.png"

@@ -62,12 +62,12 @@ def test_a_range_of_a_recording_and_what_is_missing_from_the_command(recorded: P
     out = tmp_path / "out.mcap"
     succeeds("encode", recorded, out, *FAST, "--frames", "3:7")
     assert _indexes(out.read_bytes()) == [3, 4, 5, 6]
-    assert "--topics: found nothing" in fails(2, "encode", recorded, out)
-    assert "counted from the start" in fails(2, "encode", recorded, out, *FAST, "--frames", "-2:")
-    assert "no topic /x, expected" in fails(1, "encode", recorded, out, "--topics", "/x,/y")
+    assert "--topics: found nothing" in fails(2, "encode", recorded, out, "-y")
+    assert "counted from the start" in fails(2, "encode", recorded, out, "-y", *FAST, "--frames", "-2:")
+    assert "no topic /x, expected" in fails(1, "encode", recorded, out, "-y", "--topics", "/x,/y")
     with_grid = ("--topics", GRID.replace(";", ","), "--grid", "2x2", *FAST[:4])
-    succeeds("encode", recorded, out, *with_grid, "--frames", ":2")
-    assert "4 topics, expected 3x2" in fails(2, "encode", recorded, out, *with_grid[:3], "3x2")
+    succeeds("encode", recorded, out, "-y", *with_grid, "--frames", ":2")
+    assert "4 topics, expected 3x2" in fails(2, "encode", recorded, out, "-y", *with_grid[:3], "3x2")
 
 
 def test_bytes_go_through_pipes_from_producer_to_viewer(recorded: Path) -> None:
@@ -78,7 +78,19 @@ def test_bytes_go_through_pipes_from_producer_to_viewer(recorded: Path) -> None:
         stderr=subprocess.PIPE,
     )
     decoder = subprocess.Popen(
-        [*COMMAND, "decode", "-", "-", "--format", "mcap", "--grid", "2x3", "--synthesizer", "linear"],
+        [
+            *COMMAND,
+            "decode",
+            "-",
+            "-",
+            "--format",
+            "mcap",
+            "--grid",
+            "2x3",
+            "--synthesizer",
+            "linear",
+            "--quiet",
+        ],
         stdin=encoder.stdout,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -47,7 +47,7 @@ def test_closed_output_is_one_line(array: Path, coded: Path) -> None:
 
 def test_closed_output_is_no_error_where_nothing_is_printed(coded: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert shell(f"decode {coded} {out} --synthesizer linear --frames :1 >&-") == (0, [])
+    assert shell(f"decode {coded} {out} --synthesizer linear --frames :1 --quiet >&-") == (0, [])
     assert (out / "array.json").exists()
 
 

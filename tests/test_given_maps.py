@@ -114,11 +114,11 @@ def test_the_command_codes_what_is_given(tmp_path: Path) -> None:
         for decoded in decoder:
             for found in decoded.disparities.values():
                 assert np.median(np.abs(found.values_px - 2 * disparity)) < 0.1
-    assert "--matcher given codes" in mvcodec("encode", array, out, "--matcher", "sgbm").stderr
+    assert "--matcher given codes" in mvcodec("encode", array, out, "--matcher", "sgbm", "-y").stderr
     document = json.loads((array / "array.json").read_text())
     del document["disparity"]
     (array / "array.json").write_text(json.dumps(document))
-    assert "no disparity or depth" in fails(1, "encode", array, out, "--matcher", "given")
+    assert "no disparity or depth" in fails(1, "encode", array, out, "--matcher", "given", "-y")
 
 
 def test_bad_given_maps_are_named(tmp_path: Path) -> None:
