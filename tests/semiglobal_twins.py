@@ -133,10 +133,28 @@ def winners(sums: NDArray[np.uint16], low: int) -> FloatMap:
     return disparity
 
 
-def partner_winners(sums: NDArray[np.uint16], low: int, step: tuple[float, float], unseen: float) -> FloatMap:
+def decided_sums(
+    costs: Costs,
+    grey: Bytes,
+    jumps: Bytes,
+    small: int,
+    steps: Sequence[tuple[int, int]],
+    band: int,
+    ahead: int,
+) -> NDArray[np.uint16]:
+    """Bands of rows, each as if the picture ended `ahead` rows below it."""
+    sums = np.empty(costs.shape, np.uint16)
+    for start in range(0, len(costs), band):
+        stop = start + band
+        cut = slice(0, stop + ahead)
+        sums[start:stop] = added_up(costs[cut], grey[cut], jumps, small, steps)[start:stop]
+    return sums
+
+
+def partner_winners(sums: NDArray[np.uint16], low: int, step: tuple[float, float]) -> FloatMap:
     height, width, levels = sums.shape
     least = np.full((height, width), 65535)
-    disparity = np.full((height, width), unseen, np.float32)
+    disparity = np.full((height, width), np.inf, np.float32)
     for y in range(height):
         for level in range(levels):
             for x in range(width):
@@ -168,29 +186,29 @@ def confirmed(
 
 
 def completion_costs(
-    disparity: FloatMap,
+    disparity: NDArray[np.int16],
     valid: Mask,
-    others: NDArray[np.float32],
-    others_valid: Mask,
+    others: NDArray[np.int16],
     steps: NDArray[np.float32],
     low: int,
     slope: float,
-    limit: float,
+    limit: int,
     through_cost: int,
     most: int,
     levels: int,
 ) -> Costs:
     height, width = disparity.shape
+    per_part = int(slope * 128 / 16 + 0.5)
     volume = np.zeros((height, width, levels), np.uint8)
     for y, x, level in np.ndindex(volume.shape):
         d = low + level
         if valid[y, x]:
-            volume[y, x, level] = int(min(abs(d - float(disparity[y, x])) * slope, limit, most))
+            volume[y, x, level] = min(abs(16 * d - int(disparity[y, x])) * per_part // 128, limit, most)
             continue
         through = 0
-        for other, other_valid, step in zip(others, others_valid, steps, strict=True):
+        for other, step in zip(others, steps, strict=True):
             u, v = x - round(float(step[0]) * d), y - round(float(step[1]) * d)
             inside = 0 <= u < width and 0 <= v < height
-            through += bool(inside and other_valid[v, u] and other[v, u] < d - 1.5)
+            through += bool(inside and other[v, u] < 16 * d - 24)
         volume[y, x, level] = min(through * through_cost, most)
     return volume

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from mvcodec.errors import SettingError
 from mvcodec.kernels import census, completion, matching_costs, semiglobal
-from mvcodec.stereo.scanlines import BAND_ROWS, MAX_SUM, Penalties, Scratch, added_up
+from mvcodec.stereo import scanlines
+from mvcodec.stereo.scanlines import MAX_SUM, Decided, Penalties, Scratch, decide
 
 SIZES = [(7, 9), (1, 1), (1, 11), (8, 1), (4, 5)]
 STEPS = {
@@ -67,6 +68,7 @@ def joint_costs(
         *LIMITS,
         lone_cost,
         100,
+        0,
         volume,
     )
     return volume.transpose(0, 2, 1)
@@ -165,23 +167,44 @@ def test_only_partner_of_an_array_pays_no_lone_cost_but_the_only_one_in_frame_do
     assert two.T.tolist() == [[6] * 6, [100, *[12] * 5], [100, 100, *[12] * 4]]
 
 
-def sums_of(costs: NDArray[np.uint8], grey: NDArray[np.uint8], penalties: Penalties) -> NDArray[np.uint16]:
-    """(H, W, levels)."""
-    return added_up(levels_second(costs), grey, penalties, Scratch()).transpose(0, 2, 1)
+def decided(
+    costs: NDArray[np.uint8],
+    grey: NDArray[np.uint8],
+    penalties: Penalties,
+    steps: NDArray[np.float32] | None = None,
+    low: int = 0,
+) -> Decided:
+    """Of an (H, W, levels) volume."""
+    volume = levels_second(costs)
+
+    def costs_of(first: int, found: NDArray[np.uint8]) -> None:
+        found[:] = volume[first : first + len(found)]
+
+    return decide(costs_of, grey, low, costs.shape[2], penalties, Scratch(), steps)
 
 
 PENALTIES = Penalties(small_step=18, jump=85, least_jump=25, contrast=8)
 
 
-@pytest.mark.parametrize("size", [*SIZES, (3, 2 * BAND_ROWS), (BAND_ROWS + 3, 2)], ids=str)
-@pytest.mark.parametrize("diagonal", [True, False])
-def test_sums_equal_equation_13_along_all_paths(size: tuple[int, int], diagonal: bool) -> None:
+@pytest.mark.parametrize("size", [*SIZES, (3, 40), (23, 2)], ids=str)
+@pytest.mark.parametrize("diagonals", [True, False])
+@pytest.mark.parametrize("band", [(128, 64), (4, 3), (5, 0)], ids=["one band", "looking ahead", "blind"])
+def test_decisions_equal_those_by_equation_13(
+    monkeypatch: pytest.MonkeyPatch, size: tuple[int, int], diagonals: bool, band: tuple[int, int]
+) -> None:
+    monkeypatch.setattr(scanlines, "BAND_ROWS", band[0])
+    monkeypatch.setattr(scanlines, "LOOK_AHEAD", band[1])
+    monkeypatch.setattr(scanlines, "TURNED_ROWS", 3)
     costs = random_bytes((*size, LEVELS), 5, 150)
     grey = random_bytes(size, 6, 40)
-    penalties = replace(PENALTIES, diagonal=diagonal)
-    paths = [step for step in twins.FORTH + twins.BACK if diagonal or 0 in step]
-    expected = twins.added_up(costs, grey, penalties.jumps(), 18, paths)
-    np.testing.assert_array_equal(sums_of(costs, grey, penalties), expected)
+    penalties = replace(PENALTIES, diagonals=diagonals)
+    paths = [step for step in twins.FORTH + twins.BACK if diagonals or 0 in step]
+    steps = np.array([(1, 0), (0, -0.5)], np.float32)
+    found = decided(costs, grey, penalties, steps, low=-2)
+    sums = twins.decided_sums(costs, grey, penalties.jumps(), 18, paths, *band)
+    np.testing.assert_allclose(found.disparity, twins.winners(sums, -2), atol=1e-6)
+    for step, seen in zip(steps, found.partners, strict=True):
+        np.testing.assert_array_equal(seen, twins.partner_winners(sums, -2, (step[0], step[1])))
 
 
 @pytest.mark.parametrize("levels", [1, 2, 3])
@@ -190,8 +213,8 @@ def test_few_levels_and_extreme_penalties(levels: int, penalties: tuple[int, int
     costs = random_bytes((5, 6, levels), 6, 73)
     grey = random_bytes((5, 6), 7)
     given = Penalties(*penalties)
-    expected = twins.added_up(costs, grey, given.jumps(), penalties[0], twins.FORTH + twins.BACK)
-    np.testing.assert_array_equal(sums_of(costs, grey, given), expected)
+    sums = twins.added_up(costs, grey, given.jumps(), penalties[0], twins.FORTH + twins.BACK)
+    np.testing.assert_allclose(decided(costs, grey, given).disparity, twins.winners(sums, 0), atol=1e-6)
 
 
 def test_the_dearest_paths_fit_into_8_bits() -> None:
@@ -199,8 +222,8 @@ def test_the_dearest_paths_fit_into_8_bits() -> None:
     costs = np.full((9, 9, 8), MAX_SUM - 200, np.uint8)
     costs[::2, :, 0] = costs[1::2, :, -1] = 0  # whichever way a path goes, it jumps or pays
     grey = np.zeros((9, 9), np.uint8)
-    expected = twins.added_up(costs, grey, penalties.jumps(), 100, twins.FORTH + twins.BACK)
-    np.testing.assert_array_equal(sums_of(costs, grey, penalties), expected)
+    sums = twins.added_up(costs, grey, penalties.jumps(), 100, twins.FORTH + twins.BACK)
+    np.testing.assert_allclose(decided(costs, grey, penalties).disparity, twins.winners(sums, 0), atol=1e-6)
 
 
 def test_jumps_cost_half_at_the_contrast_and_never_less_than_the_least() -> None:
@@ -225,25 +248,9 @@ def test_penalties_that_cannot_be_are_named(penalties: tuple[int, int, int, floa
 def test_what_one_pixel_knows_reaches_all_eight_ways() -> None:
     costs = np.full((7, 7, 3), 50, np.uint8)
     costs[3, 3, 1] = 0
-    sums = sums_of(costs, np.zeros((7, 7), np.uint8), Penalties(20, 40, 10, 8))
-    prefers = sums[..., 1] < sums[..., 0]
+    found = decided(costs, np.zeros((7, 7), np.uint8), Penalties(20, 40, 10, 8)).disparity
     y, x = np.mgrid[-3:4, -3:4]
-    assert (prefers == ((x == 0) | (y == 0) | (abs(x) == abs(y)))).all()
-
-
-@size_parameter
-@low_parameter
-@steps_parameter
-@pytest.mark.parametrize("spread", [3, 1000], ids=["many ties", "few ties"])
-def test_what_partners_see_equals_its_plain_twin(
-    size: tuple[int, int], low: int, steps: NDArray[np.float32], spread: int
-) -> None:
-    sums = np.random.default_rng(7).integers(0, spread, (*size, LEVELS)).astype(np.uint16)
-    for by_x, by_y in steps:
-        found = np.full(size, np.nan, np.float32)
-        semiglobal.partner_winners(levels_second(sums), low, by_x, by_y, np.inf, found)
-        expected = twins.partner_winners(sums, low, (float(by_x), float(by_y)), np.inf)
-        np.testing.assert_array_equal(found, expected)
+    assert (np.rint(found) == ((x == 0) | (y == 0) | (abs(x) == abs(y)))).all()
 
 
 @size_parameter
@@ -281,6 +288,11 @@ def test_winner_of_a_v_is_exact(centre: float) -> None:
     found = np.empty((1, 1), np.float32)
     semiglobal.winners(levels_second(sums), -10, found)
     assert found[0, 0] == pytest.approx(centre - 10, abs=1e-5)
+
+
+def parts_of_maps(size: tuple[int, int], count: int, seed: int) -> NDArray[np.int16]:
+    """Maps of -2..3 px in sixteenths."""
+    return np.random.default_rng(seed).integers(-32, 49, (count, *size)).astype(np.int16)
 
 
 def near_maps(size: tuple[int, int], count: int, seed: int) -> NDArray[np.float32]:
@@ -333,37 +345,40 @@ def test_nobody_confirms_what_is_out_of_their_frame() -> None:
 def test_completion_costs_equal_their_plain_twin(
     size: tuple[int, int], low: int, steps: NDArray[np.float32], share: float
 ) -> None:
-    own, *others = near_maps(size, 1 + len(steps), 9)
+    own, *others = parts_of_maps(size, 1 + len(steps), 9)
     valid, *others_valid = np.random.default_rng(10).uniform(size=(1 + len(steps), *size)) < share
+    behind = np.where(others_valid, others, completion.NOWHERE)
     volume = np.full((size[0], LEVELS, size[1]), 77, np.uint8)
-    arguments = own, valid, np.stack(others), np.stack(others_valid), steps, low, 7.25, 40.5, 90, 200
-    completion.completion_costs(*arguments, volume)
+    arguments = own, valid, behind, steps, low, 7.25, 40, 90, 200
+    for start in range(0, size[0], 3):
+        completion.completion_costs(*arguments, start, volume[start : start + 3])
     np.testing.assert_array_equal(volume.transpose(0, 2, 1), twins.completion_costs(*arguments, LEVELS))
 
 
 def test_without_evidence_every_disparity_is_equally_likely() -> None:
     nothing = np.zeros((4, 5), np.bool_)
     volume = np.full((4, LEVELS, 5), 77, np.uint8)
-    maps = near_maps((4, 5), 2, 11)
+    maps = parts_of_maps((4, 5), 2, 11)
+    hidden = np.full((1, 4, 5), completion.NOWHERE)
     steps = np.array([(1, 0)], np.float32)
-    completion.completion_costs(maps[0], nothing, maps[1:], nothing[None], steps, 0, 7, 40, 40, 200, volume)
+    completion.completion_costs(maps[0], nothing, hidden, steps, 0, 7, 40, 40, 200, 0, volume)
     assert (volume == 0).all()
 
 
 def test_completion_rules_out_what_another_camera_sees_through() -> None:
-    others = np.full((2, 1, 9), 1.0, np.float32)
+    others = np.full((2, 1, 9), completion.PARTS, np.int16)
     volume = np.full((1, 5, 9), 77, np.uint8)
     completion.completion_costs(
-        np.zeros((1, 9), np.float32),
+        np.zeros((1, 9), np.int16),
         np.zeros((1, 9), np.bool_),
         others,
-        np.ones((2, 1, 9), np.bool_),
         np.array([(1, 0), (-1, 0)], np.float32),
         0,
         7,
         40,
         40,
         200,
+        0,
         volume,
     )
     # Whatever stood at 3 px or nearer would hide the background, at 1 px, that both others see there.

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import subpixel_twin
 from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap
+from mvcodec.kernels.subpixel import add_pull
 from mvcodec.stereo.subpixel import MOST_PX, refine
 
 HEIGHT, WIDTH = 48, 56
@@ -151,3 +153,19 @@ def test_survives_tiny_pictures(size: tuple[int, int]) -> None:
     found = refine(start, np.ones(size, np.bool_), grey, [(grey, start)] * 2, steps)
     assert np.isfinite(found).all()
     assert np.abs(found - start).max() <= MOST_PX + 1e-6
+
+
+@pytest.mark.parametrize("size", [(6, 9), (1, 1), (1, 7), (5, 1)], ids=str)
+@pytest.mark.parametrize(("along_rows", "step"), [(True, 1.0), (True, -1.0), (False, 0.5), (False, -2.0)])
+def test_pull_equals_its_plain_twin(size: tuple[int, int], along_rows: bool, step: float) -> None:
+    rng = np.random.default_rng(8)
+    disparity = rng.uniform(-2, 3, size).astype(np.float32)
+    grey, *other = rng.uniform(0, 80, (3, *size)).astype(np.float32)
+    seen = rng.uniform(-2, 3, size).astype(np.float32)
+    pull, weight = np.zeros(size, np.float32), np.zeros(size, np.float32)
+    arguments = disparity, grey, other[0], other[1] - 40, seen, along_rows, step, 1.5, 10.0
+    add_pull(*arguments, pull, weight)
+    of_partner = other[0], other[1] - 40, seen
+    expected = subpixel_twin.add_pull(disparity, grey, of_partner, along_rows, step, 1.5, 10.0)
+    np.testing.assert_allclose(pull, expected[0], rtol=2e-3, atol=1e-2)
+    np.testing.assert_allclose(weight, expected[1], rtol=2e-3, atol=1e-2)

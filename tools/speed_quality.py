@@ -1,9 +1,10 @@
 """What a speed costs in quality: each speed's coded arrays against those of `best`, at the same bits.
 
-    python tools/speed_quality.py --data DIR [--sets A,B] [--speeds realtime,balanced] [--qp 22,27,32,37] [--json]
+    python tools/speed_quality.py --data DIR [--sets A,B] [--speeds A,B] [--qp 22,27,32,37] [--json]
 
-The first frame sets of each array are coded at each QP, with each speed's own matcher and preset, and decoded;
-luma PSNR is the mean over the real cameras and the virtual views that `tools/benchmark.py` scores (at most 8).
+The first frame sets of each array are coded at each QP, with each speed's own matcher and preset, and
+decoded; luma PSNR is the mean over the real cameras and the virtual views that `tools/benchmark.py` scores
+(at most 8).
 Printed: Bjontegaard's difference in PSNR against `best`, dB.
 """
 

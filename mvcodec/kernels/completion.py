@@ -9,6 +9,14 @@ from numpy.typing import NDArray
 FloatMap = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 Volume = NDArray[np.uint8]
+Parts = NDArray[np.int16]
+
+PARTS = 16
+"""Parts of a px that completion counts in."""
+NOWHERE = np.int16(32767)
+THROUGH_PARTS = 24
+"""What another camera sees is behind a place if it is farther by more."""
+SLOPE_BITS = 7
 
 
 @njit(cache=True, nogil=True)
@@ -43,29 +51,52 @@ def confirmed(
 
 
 @njit(cache=True, nogil=True)
-def _held(disparity, here, per_px, most, costs):  # type: ignore[no-untyped-def]
-    for x in range(disparity.size):
-        costs[x] = np.uint8(min(abs(here - disparity[x]) * per_px, most))
+def unseen(disparity: FloatMap, steps: NDArray[np.float32]) -> Mask:
+    """Where a pixel of its disparity leaves the pictures of all others, (H, W); steps as below."""
+    height, width = disparity.shape
+    outside = np.ones((height, width), np.bool_)
+    for y in range(height):
+        for p in range(len(steps)):
+            by_x, by_y = steps[p, 0], steps[p, 1]
+            for x in range(width):
+                u, v = np.float32(x) - by_x * disparity[y, x], np.float32(y) - by_y * disparity[y, x]
+                outside[y, x] &= (u < 0) | (u >= width) | (v < 0) | (v >= height)
+    return outside
 
 
 @njit(cache=True, nogil=True)
-def _seen_through(other, other_valid, nearest, count):  # type: ignore[no-untyped-def]
-    for x in range(other.size):
-        count[x] += np.uint8(other_valid[x] & (other[x] < nearest))
+def _held(parts, level, slope, farthest, most, costs):  # type: ignore[no-untyped-def]
+    for x in range(parts.size):
+        off = np.uint16(max(parts[x], level) - min(parts[x], level))
+        costs[x] = np.uint8(min(np.uint16(min(off, farthest) * slope) >> np.uint16(SLOPE_BITS), most))
+
+
+@njit(cache=True, nogil=True)
+def _add_seen_through(others, there, nearest, first, count, seen):  # type: ignore[no-untyped-def]
+    for x in range(count):
+        seen[first + x] = np.uint8(seen[first + x] + np.uint8(others[there + x] < nearest))
+
+
+@njit(cache=True, nogil=True)
+def _ruled_out(valid, seen, through_cost, most, costs):  # type: ignore[no-untyped-def]
+    """What is not valid has no cost but that of being seen through."""
+    for x in range(valid.size):
+        through = np.uint8(min(np.uint16(np.uint16(seen[x]) * through_cost), most))
+        costs[x] = costs[x] if valid[x] else through
 
 
 @njit(cache=True, nogil=True)
 def completion_costs(
-    disparity: FloatMap,
+    disparity: Parts,
     valid: Mask,
-    others: NDArray[np.float32],
-    others_valid: Mask,
+    others: Parts,
     steps: NDArray[np.float32],
     low: int,
     slope: float,
-    limit: float,
+    limit: int,
     through_cost: int,
     most: int,
+    start: int,
     volume: Volume,
 ) -> None:
     """Costs that complete a map from its valid pixels.
@@ -74,31 +105,31 @@ def completion_costs(
     its own but this: a place that another camera sees through is wrong (`through_cost` for each).
 
     Args:
-        disparity, valid: (H, W), float32 px and bool.
-        others, others_valid: (P, H, W), of the other cameras.
+        disparity: int16 (H, W), PARTS to a px; valid: bool (H, W).
+        others: int16 (P, H, W), PARTS to a px, of the other cameras; NOWHERE where not valid.
         steps: float32 (P, 2), as in `matching_costs.joint_costs`.
         low: disparity of level 0, px.
+        slope: above 0.
         most: no cost is higher.
-        volume: uint8 (H, levels, W), written.
+        volume: uint8 (R, levels, W), written: of a band of rows; start: its first row.
     """
-    height, levels, width = volume.shape
-    per_px, held = np.float32(slope), np.float32(min(limit, most))
-    count = np.empty(width, np.uint8)
-    for y in range(height):
+    (height, width), levels = disparity.shape, volume.shape[1]
+    per_part = np.uint16(max(slope * (1 << SLOPE_BITS) / PARTS + 0.5, 1))
+    farthest = np.uint16(65535 // per_part)
+    seen = np.empty(width, np.uint8)
+    for at in range(len(volume)):
+        y = start + at
         for level in range(levels):
-            costs = volume[y, level]
-            _held(disparity[y], np.float32(low + level), per_px, held, costs)
-            count[:] = 0
+            costs = volume[at, level]
+            here = np.int16((low + level) * PARTS)
+            _held(disparity[y], here, per_part, farthest, np.uint16(min(limit, most)), costs)
+            seen[:] = 0
             for p in range(len(steps)):
                 left = int(np.rint(steps[p, 0] * (low + level)))
                 row = y - int(np.rint(steps[p, 1] * (low + level)))
                 first, last = max(left, 0), min(width + left, width)
                 if 0 <= row < height and first < last:
-                    there = slice(first - left, last - left)
-                    nearest = np.float32(low + level - 1.5)
-                    _seen_through(
-                        others[p, row, there], others_valid[p, row, there], nearest, count[first:last]
-                    )
-            for x in range(width):
-                through = min(int(count[x]) * through_cost, most)
-                costs[x] = costs[x] if valid[y, x] else np.uint8(through)
+                    nearest = np.int16(here - THROUGH_PARTS)
+                    there, count = np.uint64(first - left), np.uint64(last - first)
+                    _add_seen_through(others[p, row], there, nearest, np.uint64(first), count, seen)
+            _ruled_out(valid[y], seen, np.uint16(through_cost), np.uint16(most), costs)

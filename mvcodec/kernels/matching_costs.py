@@ -99,6 +99,7 @@ def joint_costs(
     most_bits: int,
     lone_cost: int,
     outside_cost: int,
+    start: int,
     volume: Volume,
 ) -> None:
     """Costs of one of N cameras against its P partners, in units of two grey levels.
@@ -118,7 +119,7 @@ def joint_costs(
         colour_limit: most that colour counts; bit_cost: of each bit of the census, of which `most_bits` count
             at most. colour_limit + bit_cost * most_bits + lone_cost is below OUTSIDE.
         outside_cost: where no partner's picture holds the pixel.
-        volume: uint8 (H, levels, W), written.
+        volume: uint8 (R, levels, W), written: of a band of rows; start: its first row.
     """
     _, height, channels, width = planes.shape
     levels, words = volume.shape[1], census.shape[2]
@@ -127,7 +128,8 @@ def joint_costs(
     difference, bits = np.empty(width, np.uint8), np.empty(width, np.uint8)
     # Flat arrays by unsigned indexes: slices would take longer to make than rows take to compare.
     flat_planes, flat_census = planes[camera].reshape(-1), census[camera].reshape(-1)
-    for y in range(height):
+    for at in range(len(volume)):
+        y = start + at
         least[:], second[:] = OUTSIDE, OUTSIDE
         # Levels in turn, so that loops are of nearly the same length as the ones before.
         for p in range(len(steps)):
@@ -158,5 +160,5 @@ def joint_costs(
                 len(steps) > 1,
                 np.uint8(lone_cost),
                 np.uint8(outside_cost),
-                volume[y, level],
+                volume[at, level],
             )

@@ -24,7 +24,7 @@ from mvcodec.stereo.exposure import camera_gains
 from mvcodec.stereo.joint_settings import JointSettings
 from mvcodec.stereo.matching_view import CameraPartners, MatchingViews, prepare_views
 from mvcodec.stereo.partners import neighbours, outside, partners, steps, unseen_border
-from mvcodec.stereo.scanlines import MAX_SUM, ScratchPool, added_up, decide
+from mvcodec.stereo.scanlines import MAX_SUM, ScratchPool, decide
 from mvcodec.stereo.subpixel import refine
 from mvcodec.workers import run_all
 
@@ -146,12 +146,12 @@ class Joint:
         levels: int,
     ) -> tuple[FloatMap, Mask]:
         """The disparity of a camera by its own pictures, and what its own costs confirm, where asked."""
-        from mvcodec.kernels import completion, matching_costs, semiglobal
+        from mvcodec.kernels import completion, matching_costs
 
         settings = self.settings
         those = CameraPartners.of(array, camera)
-        with self._scratch.lend() as scratch:
-            costs = scratch.array("costs", (array.height, levels, array.width), np.uint8)
+
+        def costs_of(first: int, costs: NDArray[np.uint8]) -> None:
             matching_costs.joint_costs(
                 those.camera,
                 those.partners,
@@ -166,18 +166,20 @@ class Joint:
                 settings.most_bits,
                 settings.lone_cost,
                 settings.outside_cost,
+                first,
                 costs,
             )
-            sums = added_up(costs, views.grey_of(camera), settings.matching_penalties, scratch)
-            disparity = np.empty((array.height, array.width), np.float32)
-            semiglobal.winners(sums, low, disparity)
-            valid = np.ones(disparity.shape, np.bool_)
-            if settings.self_check:
-                beside = np.empty((len(those.steps), array.height, array.width), np.float32)
-                for (by_x, by_y), other in zip(those.steps, beside, strict=True):
-                    semiglobal.partner_winners(sums, low, by_x, by_y, np.inf, other)
-                valid = completion.confirmed(disparity, beside, those.steps, settings.tolerance_px)
-            return disparity, valid
+
+        asked = those.steps if settings.self_check else None
+        with self._scratch.lend() as scratch:
+            found = decide(
+                costs_of, views.grey_of(camera), low, levels, settings.matching_penalties, scratch, asked
+            )
+        if asked is None:
+            return found.disparity, np.ones(found.disparity.shape, np.bool_)
+        return found.disparity, completion.confirmed(
+            found.disparity, found.partners, asked, settings.tolerance_px
+        )
 
     def _confirmed(
         self,
@@ -218,23 +220,29 @@ class Joint:
         settings = self.settings
         penalties = settings.completion_penalties
         others = [other for other in neighbours(array, camera) if other in raw]
-        height, width = grey.shape
-        with self._scratch.lend() as scratch:
-            costs = scratch.array("costs", (height, levels, width), np.uint8)
+        own = _parts(raw[camera])
+        behind = np.stack(
+            [np.where(valid[other], _parts(raw[other]), completion.NOWHERE) for other in others]
+        )
+        most = MAX_SUM - max(penalties.jump, penalties.least_jump) - penalties.small_step
+
+        def costs_of(first: int, costs: NDArray[np.uint8]) -> None:
             completion.completion_costs(
-                raw[camera],
+                own,
                 valid[camera],
-                np.stack([raw[other] for other in others]),
-                np.stack([valid[other] for other in others]),
+                behind,
                 steps(array, camera, others),
                 low,
                 settings.hold_per_px,
                 settings.hold_limit,
                 settings.through_cost,
-                MAX_SUM - max(penalties.jump, penalties.least_jump) - penalties.small_step,
+                most,
+                first,
                 costs,
             )
-            completed = decide(costs, grey, low, penalties, scratch)
+
+        with self._scratch.lend() as scratch:
+            completed = decide(costs_of, grey, low, levels, penalties, scratch).disparity
         holds = valid[camera] & (np.abs(completed - raw[camera]) <= 1.5)
         return np.where(holds, raw[camera], completed)
 
@@ -290,6 +298,13 @@ def _refined(
         said,
         steps(array, camera, beside),
     )
+
+
+def _parts(disparity: FloatMap) -> NDArray[np.int16]:
+    """A map in the parts of a px that completion counts in."""
+    from mvcodec.kernels.completion import PARTS
+
+    return np.rint(disparity * PARTS).astype(np.int16)
 
 
 def _levels(range_px: tuple[float, float]) -> tuple[int, int]:

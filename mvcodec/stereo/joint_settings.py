@@ -42,7 +42,7 @@ class JointSettings:
     hold_per_px: float = setting(
         7, "how firmly confirmed pixels hold meanwhile, for each px", low=0, high=1e3
     )
-    hold_limit: float = setting(40, "the most that counts of it", low=0, high=127)
+    hold_limit: int = setting(40, "the most that counts of it", low=0, high=127)
     through_cost: int = setting(40, "of a disparity that another camera sees through", low=0, high=127)
     beyond_partners: bool = setting(True, "carry surfaces on to where no partner sees")
     edge_cost: float = setting(

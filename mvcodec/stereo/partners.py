@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,14 +39,20 @@ def steps(array: CameraArray, camera: Position, others: list[Position]) -> NDArr
 
 def unseen_border(array: CameraArray, camera: Position, range_px: tuple[float, float]) -> Mask:
     """bool (H, W): where the nearest disparity leaves every partner's picture."""
-    return outside(array, camera, np.full((array.height, array.width), range_px[1], np.float32))
+    height, width = array.height, array.width
+    unseen = np.ones((height, width), np.bool_)
+    for by_x, by_y in steps(array, camera, partners(array, camera)):
+        left, up = float(by_x) * range_px[1], float(by_y) * range_px[1]
+        # Columns with 0 <= x - left < width, and rows likewise.
+        columns = slice(max(math.ceil(left), 0), max(math.ceil(width + left), 0))
+        rows = slice(max(math.ceil(up), 0), max(math.ceil(height + up), 0))
+        unseen[rows, columns] = False
+    return unseen
 
 
 def outside(array: CameraArray, camera: Position, disparity: FloatMap) -> Mask:
     """bool (H, W): where a pixel of this disparity leaves every partner's picture."""
-    unseen = np.ones((array.height, array.width), np.bool_)
-    x, y = np.arange(array.width)[None], np.arange(array.height)[:, None]
-    for by_x, by_y in steps(array, camera, partners(array, camera)):
-        there_x, there_y = x - by_x * disparity, y - by_y * disparity
-        unseen &= (there_x < 0) | (there_x >= array.width) | (there_y < 0) | (there_y >= array.height)
-    return unseen
+    from mvcodec.kernels.completion import unseen
+
+    found: Mask = unseen(disparity, steps(array, camera, partners(array, camera)))
+    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from mvcodec.errors import SettingError
 from mvcodec.frames import FloatMap
 
-BAND_ROWS = 64
-"""Rows that are turned at once, for the paths along them: what fits into the caches."""
-
-_STRAIGHT = np.array([0])
-_FAN = np.array([-1, 0, 1])
+BAND_ROWS, LOOK_AHEAD = 128, 64
+"""Rows that are decided at once, and how many below them have a say: what fits into the caches. On pictures
+of at most BAND_ROWS + LOOK_AHEAD rows, and wherever no path is longer, bands change nothing."""
+TURNED_ROWS = 64
+"""Rows that are turned at once, for the paths along them."""
 
 
 MAX_SUM = 255
@@ -37,7 +37,7 @@ class Penalties:
         jump: of any other (P2), halved where grey changes by `contrast` levels.
         least_jump: what is left of it at an edge of the picture.
         contrast: grey levels, above 0.
-        diagonal: whether paths run along the diagonals too: eight, else four.
+        diagonals: whether paths run along the diagonals too: eight, else four.
 
     Raises:
         SettingError: a penalty is negative, or both together leave no room for costs.
@@ -47,7 +47,7 @@ class Penalties:
     jump: int
     least_jump: int
     contrast: float
-    diagonal: bool = True
+    diagonals: bool = True
 
     def __post_init__(self) -> None:
         if not min(self.small_step, self.jump, self.least_jump) >= 0 or not self.contrast > 0:
@@ -101,43 +101,75 @@ class ScratchPool:
             self._free.put(scratch)
 
 
-def added_up(
-    costs: NDArray[np.uint8], grey: NDArray[np.uint8], penalties: Penalties, scratch: Scratch
-) -> NDArray[np.uint16]:
-    """The costs along all paths.
+CostsOf = Callable[[int, NDArray[np.uint8]], None]
+"""Writes the costs of rows from the given one on into uint8 (rows, levels, W)."""
 
-    Args:
-        costs: uint8 (H, levels, W); see `semiglobal.add_paths`.
-        grey: uint8 (H, W), of the camera.
-        scratch: holds the result, until it is used again.
 
-    Returns:
-        uint16 (H, levels, W).
+@dataclass(frozen=True, slots=True, eq=False)
+class Decided:
+    """What semi-global matching found.
+
+    Attributes:
+        disparity: float32 (H, W), px.
+        partners: float32 (P, H, W), px: the disparity of the partners' pixels by the same sums; infinite
+            where nothing is seen.
     """
-    from mvcodec.kernels import semiglobal
 
-    jumps, small = penalties.jumps(), penalties.small_step
-    shifts = _FAN if penalties.diagonal else _STRAIGHT
-    sums = scratch.array("sums", costs.shape, np.uint16)
-    sums[:] = 0
-    for downwards in (True, False):
-        semiglobal.add_paths(costs, grey, jumps, small, shifts, False, downwards, sums)
-    _add_along_rows(costs, grey, jumps, small, sums, scratch)
-    return sums
+    disparity: FloatMap
+    partners: NDArray[np.float32]
 
 
 def decide(
-    costs: NDArray[np.uint8], grey: NDArray[np.uint8], low: int, penalties: Penalties, scratch: Scratch
-) -> FloatMap:
-    """The disparity of least cost: float32 (H, W), px. `low` is that of level 0; see `added_up`."""
+    costs_of: CostsOf,
+    grey: NDArray[np.uint8],
+    low: int,
+    levels: int,
+    penalties: Penalties,
+    scratch: Scratch,
+    partner_steps: NDArray[np.float32] | None = None,
+) -> Decided:
+    """The disparity of least cost, band by band, so that memory holds a band and not the whole volume.
+
+    Paths from above come through all bands. Those from below begin LOOK_AHEAD rows below a band.
+
+    Args:
+        costs_of: gives the costs; see `semiglobal.add_paths`.
+        grey: uint8 (H, W), of the camera.
+        low, levels: disparity of level 0, px, and how many levels there are.
+        partner_steps: float32 (P, 2), see `semiglobal.take_partner_winners`; None: nothing about partners.
+    """
     from mvcodec.kernels import semiglobal
 
-    disparity = np.empty(grey.shape, np.float32)
-    semiglobal.winners(added_up(costs, grey, penalties, scratch), low, disparity)
-    return disparity
+    height, width = grey.shape
+    jumps, small, paths = penalties.jumps(), penalties.small_step, 3 if penalties.diagonals else 1
+    above = semiglobal.path_state(levels, width, paths, small)
+    costs = scratch.array("costs", (BAND_ROWS + LOOK_AHEAD, levels, width), np.uint8)
+    disparity = np.empty((height, width), np.float32)
+    steps = np.empty((0, 2), np.float32) if partner_steps is None else partner_steps
+    seen = np.full((len(steps), 2, height, width), 65535, np.uint16)
+    known = 0
+    for start in range(0, height, BAND_ROWS):
+        stop = min(start + BAND_ROWS, height)
+        reach = min(stop + LOOK_AHEAD, height)
+        ahead = known - start if start else 0
+        costs[:ahead] = costs[BAND_ROWS : BAND_ROWS + ahead]
+        costs_of(start + ahead, costs[ahead : reach - start])
+        known = reach
+        band = costs[: stop - start]
+        sums = scratch.array("sums", band.shape, np.uint16)
+        _set_along_rows(band, grey[start:stop], jumps, small, sums, scratch)
+        semiglobal.add_paths(band, grey, start, jumps, small, True, start > 0, *above, sums)
+        below = semiglobal.path_state(levels, width, paths, small)
+        with_below = costs[: reach - start]
+        semiglobal.add_paths(with_below, grey, start, jumps, small, False, False, *below, sums)
+        semiglobal.winners(sums, low, disparity[start:stop])
+        for (by_x, by_y), (least, best) in zip(steps, seen, strict=True):
+            semiglobal.take_partner_winners(sums, start, low, by_x, by_y, least, best)
+    best = seen[:, 1]
+    return Decided(disparity, np.where(best == 65535, np.float32(np.inf), best.astype(np.float32) + low))
 
 
-def _add_along_rows(
+def _set_along_rows(
     costs: NDArray[np.uint8],
     grey: NDArray[np.uint8],
     jumps: NDArray[np.uint8],
@@ -145,32 +177,22 @@ def _add_along_rows(
     sums: NDArray[np.uint16],
     scratch: Scratch,
 ) -> None:
-    """Paths along rows are paths from row to row of the turned picture."""
+    """Both paths along rows: paths from row to row of turned bands."""
     from mvcodec.kernels import semiglobal
 
     height, levels, width = costs.shape
-    for start in range(0, height, BAND_ROWS):
-        band = slice(start, start + BAND_ROWS)
+    flat = levels * width
+    for start in range(0, height, TURNED_ROWS):
+        band = slice(start, start + TURNED_ROWS)
         rows = len(grey[band])
-        flat = levels * width
         turned = scratch.array("turned", (flat, rows), np.uint8)
-        turned_sums = scratch.array("turned sums", (flat, rows), np.uint16)
-        back = scratch.array("back", (rows, flat), np.uint16)
         cv2.transpose(costs[band].reshape(rows, flat), turned)
         turned_grey = np.ascontiguousarray(grey[band].T)
-        turned_sums[:] = 0
-        shape = levels, width, rows
-        for forwards in (True, False):
-            semiglobal.add_paths(
-                turned.reshape(shape),
-                turned_grey,
-                jumps,
-                small,
-                _STRAIGHT,
-                True,
-                forwards,
-                turned_sums.reshape(shape),
+        path = scratch.array("path", (levels, width, rows), np.uint8)
+        back = scratch.array("back", (2, rows, flat), np.uint8)
+        for forwards, found in zip((True, False), back, strict=True):
+            semiglobal.turned_path(
+                turned.reshape(levels, width, rows), turned_grey, jumps, small, forwards, path
             )
-        cv2.transpose(turned_sums, back)
-        of_band = sums[band].reshape(rows, flat)
-        cv2.add(of_band, back, of_band)
+            cv2.transpose(path.reshape(flat, rows), found)
+        cv2.add(back[0], back[1], sums[band].reshape(rows, flat), dtype=cv2.CV_16U)

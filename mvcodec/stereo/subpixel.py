@@ -36,29 +36,31 @@ def refine(
         grey: float32 (H, W), of the map's own camera.
         partners: (grey, disparity) of each partner, float32 (H, W). A partner counts where its own
             disparity agrees, the less the more its grey differs (GREY_SCALE levels halve it).
-        steps: float32 (P, 2): a pixel of disparity d is at (x - steps[p, 0] * d, y - steps[p, 1] * d).
+        steps: float32 (P, 2): a pixel of disparity d is at (x - steps[p, 0] * d, y - steps[p, 1] * d); one of
+            both is 0.
 
     Returns:
         float32 (H, W), px.
     """
-    height, width = disparity.shape
-    x = np.arange(width, dtype=np.float32)[None]
-    y = np.arange(height, dtype=np.float32)[:, None]
+    from mvcodec.kernels.subpixel import add_pull
+
     pull, weight = np.zeros_like(disparity), np.zeros_like(disparity)
     for (other_grey, other_disparity), (by_x, by_y) in zip(partners, steps, strict=True):
-        at_x, at_y = x - by_x * disparity, y - by_y * disparity
-        seen = cv2.remap(other_grey, at_x, at_y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        slope = np.zeros_like(disparity)
-        for by, dx, dy in ((by_x, 1, 0), (by_y, 0, 1)):
-            if by != 0:
-                gradient = cv2.Sobel(other_grey, cv2.CV_32F, dx, dy, scale=1 / 8)
-                slope -= by * cv2.remap(gradient, at_x, at_y, cv2.INTER_LINEAR)
-        there = cv2.remap(other_disparity, at_x, at_y, cv2.INTER_NEAREST)
-        inside = (at_x >= 0) & (at_x <= width - 1) & (at_y >= 0) & (at_y <= height - 1)
-        residual = grey - seen
-        trust = (inside & (np.abs(there - disparity) < SAME_SURFACE_PX)) / (1 + (residual / GREY_SCALE) ** 2)
-        pull += trust * slope * residual
-        weight += trust * slope * slope
+        along_rows = bool(by_x != 0)
+        slope = cv2.Sobel(other_grey, cv2.CV_32F, int(along_rows), int(not along_rows), scale=1 / 8)
+        add_pull(
+            disparity,
+            grey,
+            other_grey,
+            np.asarray(slope, np.float32),
+            other_disparity,
+            along_rows,
+            by_x if along_rows else by_y,
+            SAME_SURFACE_PX,
+            GREY_SCALE,
+            pull,
+            weight,
+        )
     windowed_pull = np.asarray(cv2.GaussianBlur(pull, (0, 0), WINDOW_SIGMA_PX), np.float32)
     windowed_weight = np.asarray(cv2.GaussianBlur(weight, (0, 0), WINDOW_SIGMA_PX), np.float32)
     change = np.clip(windowed_pull / (windowed_weight + DAMPING), -MOST_PX, MOST_PX)
