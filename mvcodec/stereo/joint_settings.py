@@ -93,7 +93,9 @@ SMALL_CENSUS: dict[str, Any] = {
     "jump": 85,
 }
 
-BALANCED: dict[str, Any] = {**SMALL_CENSUS, "diagonals": False, "subpixel_steps": 1}
+BALANCED: dict[str, Any] = {**SMALL_CENSUS, "subpixel_steps": 2}
+
+"""Of what is matched in small copies (`mvcodec.stereo.realtime`)."""
 
 REALTIME: dict[str, Any] = {
     **SMALL_CENSUS,
@@ -103,3 +105,6 @@ REALTIME: dict[str, Any] = {
     "beyond_partners": False,
     "subpixel_steps": 0,
 }
+
+SMALL_PICTURES: dict[str, Any] = {"completion": True, "beyond_partners": True}
+"""What pictures that are too small to be shrunk have time for in real time."""

@@ -25,9 +25,9 @@ def _fixed_window(measure: str, title: str, window: int = 9) -> Plugin:
 
 MATCHERS: dict[str, Plugin] = {
     "joint": Plugin(Joint, JointSettings, "each camera against all its neighbours at once; the default"),
-    "balanced": Plugin(Joint, JointSettings, "the same with less in it: a few times as fast", BALANCED),
+    "balanced": Plugin(Realtime, JointSettings, "the same of small copies: several times as fast", BALANCED),
     "realtime": Plugin(
-        Realtime, JointSettings, "the same of small copies, and only of cameras whose map is sent", REALTIME
+        Realtime, JointSettings, "that with less in it, and only of cameras whose map is sent", REALTIME
     ),
     "sgbm": Plugin(
         lambda made: Pairwise(Sgbm(made)), SgbmSettings, "semi-global matching of pairs, by OpenCV"

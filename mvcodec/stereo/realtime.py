@@ -16,7 +16,7 @@ import numpy as np
 from mvcodec.array import CameraArray, Position
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.stereo.joint import Joint
-from mvcodec.stereo.joint_settings import REALTIME, JointSettings
+from mvcodec.stereo.joint_settings import REALTIME, SMALL_PICTURES, JointSettings
 from mvcodec.workers import run_all
 
 MOST_PX = (240_000, 900_000)
@@ -33,7 +33,9 @@ class Realtime:
 
     def __init__(self, settings: JointSettings | None = None, most_px: tuple[int, ...] = MOST_PX) -> None:
         """Match at half the size where pictures have more than most_px[0] pixels, and so on."""
-        self._joint = Joint(settings or JointSettings(**REALTIME))
+        chosen = settings or JointSettings(**REALTIME)
+        self._joint = Joint(chosen)
+        self._unshrunk = Joint(replace(chosen, **SMALL_PICTURES))
         self._most_px = most_px
 
     def match(
@@ -52,7 +54,13 @@ class Realtime:
     ) -> dict[Position, DisparityMap]:
         """See `SelectiveMatcher.match_cameras`."""
         halvings = sum(array.width * array.height > most for most in self._most_px)
-        return self._match_halved(array, pictures, range_px, cameras, fresh, halvings)
+        # Without the check by their own costs, maps confirm each other, and all are needed.
+        matched = cameras if self._joint.settings.self_check else array.real
+        if halvings == 0:
+            maps = self._unshrunk.maps_of(array, pictures, range_px, matched, fresh)
+        else:
+            maps = self._match_halved(array, pictures, range_px, matched, fresh, halvings)
+        return {camera: maps[camera] for camera in cameras}
 
     def _match_halved(
         self,
