@@ -8,6 +8,7 @@ from stereo_scene import Planes, linear_or_grid
 
 from mvcodec.array import Position
 from mvcodec.frames import DisparityMap, Picture
+from mvcodec.stereo.joint_settings import BALANCED, JointSettings
 from mvcodec.stereo.matcher import SelectiveMatcher
 from mvcodec.stereo.realtime import Realtime
 
@@ -35,7 +36,7 @@ def test_surfaces_are_found_at_every_size(shape: tuple[int, int], halvings: int)
 def test_a_camera_is_matched_alone_as_among_others() -> None:
     array = linear_or_grid(2, 2, 120, 80)
     pictures = Planes(array, 4, 16).pictures()
-    matcher = Realtime()
+    matcher = Realtime(most_px=(0,))
     assert isinstance(matcher, SelectiveMatcher)
     every = matcher.match(array, pictures, RANGE_PX)
     two: list[Position] = [(0, 0), (1, 1)]
@@ -44,6 +45,16 @@ def test_a_camera_is_matched_alone_as_among_others() -> None:
     for camera in two:
         np.testing.assert_array_equal(some[camera].values_px, every[camera].values_px)
         np.testing.assert_array_equal(some[camera].valid, every[camera].valid)
+
+
+def test_balanced_maps_confirm_each_other_whatever_is_asked_for() -> None:
+    array = linear_or_grid(2, 2, 120, 80)
+    pictures = Planes(array, 4, 16).pictures()
+    matcher = Realtime(JointSettings(**BALANCED), most_px=(0,))
+    every = matcher.match(array, pictures, RANGE_PX)
+    some = matcher.match_cameras(array, pictures, RANGE_PX, [(1, 1)], fresh=True)
+    assert list(some) == [(1, 1)]
+    np.testing.assert_array_equal(some[1, 1].values_px, every[1, 1].values_px)
 
 
 def test_what_no_partner_sees_is_not_valid() -> None:
