@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap, Mask
-from mvcodec.kernels import view_colour, view_depth, view_fetch, view_holes, view_planes, view_vectors
+from mvcodec.kernels import (
+    view_colour,
+    view_depth,
+    view_fetch,
+    view_holes,
+    view_marks,
+    view_planes,
+    view_vectors,
+)
 from mvcodec.synthesis.layered import LayeredSettings
 
 SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11), (14, 8)]
@@ -324,6 +332,16 @@ def test_paint_holes(seed: int, shape: Shape, holes: float, reach: int) -> None:
     seen_by = (rng.random(shape) >= holes).astype(np.uint8)
     picture[seen_by == 0] = 0
     expected = twins.paint_holes(picture, disparity, seen_by, 1.5, reach)
-    view_holes.paint_holes(picture, disparity, seen_by, 1.5, reach)
+    arguments = picture, disparity, seen_by, 1.5, reach
+    in_bands(shape[0], picture, lambda *band: view_holes.paint_holes(*arguments, *band))
     assert np.abs(picture.astype(int) - expected).max() <= 1
     np.testing.assert_array_equal(picture[seen_by > 0], expected[seen_by > 0])
+
+
+@pytest.mark.parametrize("width", [1, 31, 32, 33, 100])
+@pytest.mark.parametrize("share", [0.0, 0.05, 1.0])
+def test_list_marked(width: int, share: float) -> None:
+    marks = (np.random.default_rng(width).random(width) < share).astype(np.uint8)
+    chosen = np.full(width, -1, np.int32)
+    count = view_marks.list_marked(marks, chosen)
+    np.testing.assert_array_equal(chosen[:count], np.flatnonzero(marks))

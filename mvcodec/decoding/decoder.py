@@ -23,6 +23,7 @@ from mvcodec.decoding.estimated_maps import (
     decoding_matcher,
     estimate_maps,
 )
+from mvcodec.decoding.on_demand import OnDemand
 from mvcodec.decoding.stand_in import fill_absent
 from mvcodec.enhancement import LAYER_TRACK, EnhancementHeader
 from mvcodec.errors import MissingReference, MvCodecWarning, SettingError, StreamClosed, StreamError
@@ -36,7 +37,7 @@ from mvcodec.video.colour import to_picture
 from mvcodec.video.disparity_code import dequantise
 from mvcodec.video.map_size import enlarged, small_size, track_sizes
 from mvcodec.video.track import PredictedTrackDecoder, TrackDecoder
-from mvcodec.workers import Job, check_threads, run_all, settle, submit
+from mvcodec.workers import Job, check_threads, settle, submit
 
 OnError = Literal["skip", "stop"]
 
@@ -303,7 +304,10 @@ class Decoder(Closing):
         if not (senders or (self._matcher and can_be_estimated(array, there))):
             return []
         textures = [planes[self.header.picture_track(camera)] for camera in there]
-        pictures = dict(zip(there, run_all(self._picture, textures), strict=True))
+        pictures: Mapping[Position, Picture] = OnDemand(
+            dict(zip(there, textures, strict=True)),
+            lambda _, found: to_picture(found, array.width, array.height),
+        )
         disparities: Mapping[Position, DisparityMap]
         if self._matcher is None:
             disparities = self._sent_maps(planes, there, senders, pictures)
@@ -325,16 +329,18 @@ class Decoder(Closing):
         there: Sequence[Position],
         senders: Sequence[Position],
         pictures: Mapping[Position, Picture],
-    ) -> dict[Position, DisparityMap]:
+    ) -> Mapping[Position, DisparityMap]:
         """The maps of the cameras that are there: as sent, and of those that send none as derived."""
-        maps = [planes[Track(TrackKind.DISPARITY, camera)] for camera in senders]
-        found = run_all(self._map, maps, [pictures[camera] for camera in senders])
-        sent = dict(zip(senders, found, strict=True))
-        others = [camera for camera in there if camera not in sent]
-        span = self.header.disparity_range_px
-        derived = run_all(partial(derive_map, self.header.array, sent, span), others)
-        known = sent | dict(zip(others, derived, strict=True))
-        return {camera: known[camera] for camera in there}
+        header = self.header
+        coded = {camera: planes[Track(TrackKind.DISPARITY, camera)] for camera in senders}
+        sent = OnDemand(coded, lambda camera, codes: _map(header, codes, pictures[camera]))
+
+        def known(camera: Position, _: None) -> DisparityMap:
+            if camera in coded:
+                return sent[camera]
+            return derive_map(header.array, sent, header.disparity_range_px, camera)
+
+        return OnDemand(dict.fromkeys(there), known)
 
     def _planes(self, packets: PacketSet) -> tuple[dict[Track, Planes], dict[Position, StreamError]]:
         """Decode every track. What is missing is a reason why its camera is absent; damage is raised."""
@@ -394,15 +400,11 @@ class Decoder(Closing):
             warnings.warn(text, MvCodecWarning, stacklevel=2)
         self._absent = frozenset(reasons)
 
-    def _picture(self, planes: Planes) -> Picture:
-        array = self.header.array
-        return to_picture(planes, array.width, array.height)
 
-    def _map(self, planes: Planes, picture: Picture) -> DisparityMap:
-        header = self.header
-        width, height = small_size(header.array.width, header.array.height, header.disparity_scale)
-        found = dequantise(planes.y[:height, :width], header.disparity_range_px)
-        return found if header.disparity_scale == 1 else enlarged(found.values_px, picture)
+def _map(header: StreamHeader, planes: Planes, picture: Picture) -> DisparityMap:
+    width, height = small_size(header.array.width, header.array.height, header.disparity_scale)
+    found = dequantise(planes.y[:height, :width], header.disparity_range_px)
+    return found if header.disparity_scale == 1 else enlarged(found.values_px, picture)
 
 
 def _predictions(frame: FramePrediction, predicted: PredictedCamera) -> list[Planes]:

@@ -200,10 +200,10 @@ def _opened(source: str | Path | SharedFile) -> str | Path | BinaryIO:
 
 
 def _bytes_of(decoded: DecodedSet) -> int:
-    pictures = sum(picture.nbytes for picture in decoded.pictures.values())
-    # Maps that are made when somebody looks at them count as if they were there.
-    pixels = len(decoded.disparities) * decoded.array.height * decoded.array.width
-    return pictures + pixels * (np.float32().nbytes + np.bool_().nbytes)
+    # Pictures and maps that are made when somebody looks at them count as if they were there.
+    pixels = decoded.array.height * decoded.array.width
+    of_a_map = np.float32().nbytes + np.bool_().nbytes
+    return pixels * (3 * len(decoded.pictures) + of_a_map * len(decoded.disparities))
 
 
 class _Cursor:

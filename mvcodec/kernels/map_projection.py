@@ -27,6 +27,7 @@ def project(values: FloatMap, right: float, down: float, out: FloatMap) -> None:
     flat[:] = -np.inf
     places = np.empty(width, np.int32)
     beside, below = np.empty(width, np.int32), np.empty(width, np.int32)
+    chosen = np.empty(width, np.int32)
     for y in range(height):
         row = values[y]
         for x in range(width):  # vectorised: no branch
@@ -37,17 +38,17 @@ def project(values: FloatMap, right: float, down: float, out: FloatMap) -> None:
             places[x] = v * stride + u
             beside[x] = to_x > u
             below[x] = to_y > v
+        count = 0
         for x in range(width):
-            d = row[x]
-            place = np.uint32(places[x])
+            d, place = row[x], np.uint32(places[x])
             flat[place] = max(flat[place], d)
-            if beside[x]:
-                flat[place + np.uint32(1)] = max(flat[place + np.uint32(1)], d)
-            if below[x]:
-                place += np.uint32(stride)
+            chosen[count] = x
+            count += (beside[x] | below[x]) != 0
+        for x in chosen[:count]:  # again where one of them is 0, which costs less than to ask
+            d, down_by = row[x], np.int32(below[x] * stride)
+            for step in (beside[x], down_by, np.int32(beside[x] + down_by)):
+                place = np.uint32(places[x] + step)
                 flat[place] = max(flat[place], d)
-                if beside[x]:
-                    flat[place + np.uint32(1)] = max(flat[place + np.uint32(1)], d)
 
 
 @njit(cache=True, nogil=True)

@@ -14,7 +14,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvcodec.kernels.view_fetch import BORDER, CONTOUR, add_edge, place_of
-from mvcodec.kernels.view_vectors import add_fetched
+from mvcodec.kernels.view_marks import list_marked
+from mvcodec.kernels.view_vectors import add_fetched, store_colour
 
 FloatMap = NDArray[np.float32]
 ByteMap = NDArray[np.uint8]
@@ -97,7 +98,7 @@ def _add_surfaces(x, y, own, view_disparity, seeing, tolerance, others, surface,
 
 
 @njit(cache=True, nogil=True)
-def _find_contours(y, view_disparity, tolerance, high, low, chosen):  # type: ignore[no-untyped-def]
+def _find_contours(y, view_disparity, tolerance, high, low, marks, chosen):  # type: ignore[no-untyped-def]
     """Lists the pixels of a row whose 3 x 3 window holds more than one surface; their number."""
     height, width = view_disparity.shape
     above, here = view_disparity[max(y - 1, 0)], view_disparity[y]
@@ -107,13 +108,11 @@ def _find_contours(y, view_disparity, tolerance, high, low, chosen):  # type: ig
         low[x + 1] = min(min(above[x], here[x]), below[x])
     for ends in (high, low):
         ends[0], ends[-1] = ends[1], ends[-2]
-    count = 0
     for x in range(width):
         nearest = max(max(high[x], high[x + 1]), high[x + 2])
         farthest = min(min(low[x], low[x + 1]), low[x + 2])
-        chosen[count] = x
-        count += nearest - farthest > tolerance
-    return count
+        marks[x] = nearest - farthest > tolerance
+    return list_marked(marks, chosen)
 
 
 @njit(cache=True, nogil=True)
@@ -165,22 +164,6 @@ def _add_edges(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _store(sums, channels, out):  # type: ignore[no-untyped-def]
-    """A row of sums to RGB; `channels` is room."""
-    half, low, high = np.float32(0.5), np.float32(0), np.float32(255)
-    for x in range(out.shape[0]):
-        total = sums[x, 3]
-        scale = np.float32(1) / total if total > 0 else np.float32(0)
-        grey, red, blue = scale * sums[x, 0], scale * sums[x, 1], scale * sums[x, 2]
-        green = grey - (np.float32(0.299 / 0.587) * red + np.float32(0.114 / 0.587) * blue)
-        channels[0, x] = min(max(grey + red + half, low), high)
-        channels[1, x] = min(max(green + half, low), high)
-        channels[2, x] = min(max(grey + blue + half, low), high)
-    for x in range(out.shape[0]):
-        out[x, 0], out[x, 1], out[x, 2] = channels[0, x], channels[1, x], channels[2, x]
-
-
-@njit(cache=True, nogil=True)
 def blend(
     cameras: NDArray[np.int64],
     planes: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]],
@@ -211,7 +194,8 @@ def blend(
         view_disparity: float32 (H, W), known everywhere.
         tolerance: px within which disparities are one surface.
         polynomial: of the cubic fetch of luma, see `view_vectors.cubic_polynomial`.
-        out: uint8 (H, W, 3) RGB, rows first..last-1 overwritten; black where no camera sees the pixel.
+        out: uint8 (H, W, 3) RGB, C-contiguous, rows first..last-1 overwritten; black where no camera
+            sees the pixel.
         seen_by: uint8 (H, W), overwritten with the number of cameras; 0 where none sees the pixel.
     """
     luma, colour, fetchable = planes[0].ravel(), planes[1].ravel(), planes[3].ravel()
@@ -226,7 +210,8 @@ def blend(
     high, low = np.empty(width + 2, np.float32), np.empty(width + 2, np.float32)
     parts, insides = np.empty((2, width), np.float32), np.empty(width, np.bool_)
     places, chosen = np.empty(width, np.int32), np.empty(width, np.int32)
-    sums, channels = np.empty((width, 4), np.float32), np.empty((3, width), np.uint8)
+    sums, marks = np.empty((width, 4), np.float32), np.empty(width, np.uint8)
+    flat, pixels = sums.ravel(), out.ravel()
     for y in range(first, last):
         disparity, seen = view_disparity[y], seen_by[y]
         sums[:] = 0
@@ -245,7 +230,7 @@ def blend(
                 places,
                 insides,
                 parts,
-                sums.ravel(),
+                flat,
                 seen,
                 chosen,
             )
@@ -260,11 +245,12 @@ def blend(
                 chosen[:count],
                 places,
                 parts,
-                sums.ravel(),
+                flat,
                 seen,
             )
-        count = _find_contours(y, view_disparity, near_px, high, low, chosen)
+        count = _find_contours(y, view_disparity, near_px, high, low, marks, chosen)
         for x in chosen[:count]:
             if seen[x] > 0:  # with its neighbours' colour alone it would spread that into holes beside it
                 _add_surfaces(x, y, sums[x], view_disparity, seeing, near_px, others, surface, part)
-        _store(sums, channels, out[y])
+        for x in range(width):
+            store_colour(flat, np.uintp(4) * np.uintp(x), pixels, np.uintp(3) * np.uintp(y * width + x))

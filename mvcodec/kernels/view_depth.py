@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvcodec.kernels.view_fetch import BORDER
+from mvcodec.kernels.view_marks import list_marked
 
 FloatMap = NDArray[np.float32]
 
@@ -40,6 +41,7 @@ def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out
     flat[:] = UNKNOWN
     places = np.empty(width, np.int32)
     beside, above = np.empty(width, np.int32), np.empty(width, np.int32)
+    chosen = np.empty(width, np.int32)
     for y in range(height):
         row = disparity[y]
         for x in range(width):  # vectorised: no branch, 32 bits throughout
@@ -51,19 +53,18 @@ def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out
             places[x] = v * stride + u
             beside[x] = np.int32(part_x >= spill) - np.int32(part_x <= -spill)
             above[x] = (np.int32(part_y >= spill) - np.int32(part_y <= -spill)) * stride
+        count = 0
         for x in range(width):
-            d = row[x]
-            place = np.uint32(places[x])
+            d, place = row[x], np.uint32(places[x])
             flat[place] = max(flat[place], d)
-            if beside[x] != 0:
-                place = np.uint32(places[x] + beside[x])
+            chosen[count] = x
+            count += (beside[x] | above[x]) != 0
+        for x in chosen[:count]:  # again where one of them is 0, which costs less than to ask
+            d = row[x]
+            corner = np.int32(beside[x] + above[x])
+            for step in (beside[x], above[x], corner):
+                place = np.uint32(places[x] + step)
                 flat[place] = max(flat[place], d)
-            if above[x] != 0:
-                place = np.uint32(places[x] + above[x])
-                flat[place] = max(flat[place], d)
-                if beside[x] != 0:
-                    place = np.uint32(places[x] + above[x] + beside[x])
-                    flat[place] = max(flat[place], d)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -187,25 +188,27 @@ def vote(
     who = np.empty(count, np.int64)
     near_px, least, share = np.float32(tolerance), np.float32(ratio), np.float32(denial)
     limits = near_px, np.float32(contrast)
-    nearest = np.empty(width, np.float32)
-    farthest = np.empty(width, np.float32)
-    everyone = np.float32(0)
-    for i in range(count):
-        everyone += weights[i]
+    nearest, farthest = np.empty(width, np.float32), np.empty(width, np.float32)
+    total, marks = np.empty(width, np.float32), np.empty(width, np.uint8)
+    chosen = np.empty(width, np.int32)
     for y in range(first, last):
         mean = out[y]
         mean[:] = 0
+        total[:] = 0
         nearest[:] = UNKNOWN
         farthest[:] = -UNKNOWN
         for i in range(count):
-            row, part = moved[i, y + 1, 1:-1], weights[i] / everyone
-            for x in range(width):
+            row, weight = moved[i, y + 1, 1:-1], weights[i]
+            for x in range(width):  # vectorised: no branch
+                part = weight if row[x] > UNKNOWN else np.float32(0)
                 mean[x] += part * row[x]
+                total[x] += part
                 nearest[x] = max(nearest[x], row[x])
-                farthest[x] = min(farthest[x], row[x])
+                farthest[x] = min(farthest[x], row[x] if row[x] > UNKNOWN else -UNKNOWN)
         for x in range(width):
-            if nearest[x] - farthest[x] <= near_px and nearest[x] > UNKNOWN:
-                continue
+            mean[x] = mean[x] / total[x] if total[x] > 0 else UNKNOWN
+            marks[x] = nearest[x] - farthest[x] > near_px
+        for x in chosen[: list_marked(marks, chosen)]:
             known = 0
             for i in range(count):
                 d = moved[i, y + 1, x + 1]
@@ -218,9 +221,6 @@ def vote(
                     near[place] = d
                     who[place] = i
                     known += 1
-            if known and near[0] - near[known - 1] <= near_px:
-                mean[x], _ = _surface(near, who, weights, 0, known)
-                continue
             mean[x] = _outvote(
                 x, y, near, who, known, cameras, maps, lumas, shifts, weights, limits, least, share
             )
@@ -240,11 +240,12 @@ def restore_thin(voted: FloatMap, tolerance: float, cleaned: FloatMap, first: in
     """
     height, width = voted.shape
     near = np.float32(tolerance)
+    marks, chosen = np.empty(width, np.uint8), np.empty(width, np.int32)
     for y in range(first, last):
         for x in range(width):
+            marks[x] = (voted[y, x] > UNKNOWN) & (abs(cleaned[y, x] - voted[y, x]) > near)
+        for x in chosen[: list_marked(marks, chosen)]:
             d = voted[y, x]
-            if d <= UNKNOWN or abs(cleaned[y, x] - d) <= near:
-                continue
             alike = -1  # the pixel is like itself
             for v in range(max(y - 1, 0), min(y + 2, height)):
                 for u in range(max(x - 1, 0), min(x + 2, width)):
@@ -262,7 +263,10 @@ def fill_background(disparity: FloatMap, fallback: float, first: int, last: int)
     """
     _, width = disparity.shape
     for y in range(first, last):
-        x = 0
+        unknown = 0
+        for x in range(width):
+            unknown += disparity[y, x] <= UNKNOWN
+        x = 0 if unknown else width
         while x < width:
             if disparity[y, x] > UNKNOWN:
                 x += 1

@@ -6,25 +6,34 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvcodec.kernels.view_marks import list_marked
+
 FloatMap = NDArray[np.float32]
 ByteMap = NDArray[np.uint8]
 
 
 @njit(cache=True, nogil=True)
 def paint_holes(
-    picture: NDArray[np.uint8], disparity: FloatMap, seen_by: ByteMap, tolerance: float, reach: int
+    picture: NDArray[np.uint8],
+    disparity: FloatMap,
+    seen_by: ByteMap,
+    tolerance: float,
+    reach: int,
+    first: int,
+    last: int,
 ) -> None:
-    """Paint pixels that no camera sees, in place, from the background around them.
+    """Paint pixels that no camera sees, in place, from the background around them, rows first..last-1.
 
     Of the first seen pixels in eight directions (up to `reach` px away), those on the farthest surface
     are averaged by inverse square distance.
     """
     height, width = disparity.shape
     found = np.empty((8, 3), np.int64)
-    for y in range(height):
+    marks, chosen = np.empty(width, np.uint8), np.empty(width, np.int32)
+    for y in range(first, last):
         for x in range(width):
-            if seen_by[y, x]:
-                continue
+            marks[x] = seen_by[y, x] == 0
+        for x in chosen[: list_marked(marks, chosen)]:
             count = 0
             farthest = np.float32(np.inf)
             for direction in range(9):

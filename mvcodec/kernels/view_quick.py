@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvcodec.kernels.view_fetch import place_of
+from mvcodec.kernels.view_vectors import add_lanes, store_lanes
 
 FloatMap = NDArray[np.float32]
 
@@ -18,8 +19,6 @@ STEPS = 16
 """Places between two pixels that a fetch tells apart. The products of both axes fill a lane's upper byte."""
 WEIGHTS = 256
 """The weights of a view's cameras may sum up to this, so that no lane overflows."""
-LANES = np.uint64(0x00FF00FF00FF00FF)
-HALVES = np.uint64(0x0080008000800080)
 
 
 @njit(cache=True, nogil=True)
@@ -40,10 +39,22 @@ def pack(picture: NDArray[np.uint8], out: NDArray[np.uint64]) -> None:
     out[height] = out[height - 1]
 
 
+def _shares() -> NDArray[np.uint16]:
+    """uint16 (STEPS^2, 16): what the four pixels around a place count, see `view_vectors.add_lanes`."""
+    down, right = np.mgrid[:STEPS, :STEPS][:, :, :, None]
+    ones = np.ones(4, np.int64)
+    above = [(STEPS - down) * (STEPS - right) * ones, (STEPS - down) * right * ones]
+    below = [down * (STEPS - right) * ones, down * right * ones]
+    return np.concatenate(above + below, axis=2).reshape(STEPS * STEPS, 16).astype(np.uint16)
+
+
+SHARES = _shares()
+
+
 @njit(cache=True, nogil=True)
-def _locate(y, disparity, shift, shape, places, nearest, parts):  # type: ignore[no-untyped-def]
+def _locate(y, disparity, shift, shape, places, nearest, phases):  # type: ignore[no-untyped-def]
     """Where a camera sees one row of the view: flat index up left of there in its packed picture, -1 outside,
-    flat index of the nearest pixel in its map, and the fractions in STEPS."""
+    flat index of the nearest pixel in its map, and which of SHARES count."""
     height, width = shape
     shift_x, shift_y = shift
     steps, half, one = np.int32(STEPS), np.int32(STEPS // 2), np.float32(STEPS)
@@ -51,32 +62,21 @@ def _locate(y, disparity, shift, shape, places, nearest, parts):  # type: ignore
         at_x, at_y, inside = place_of(x, y, disparity[x], shift_x, shift_y, width, height)
         fine_x = np.int32(at_x * one + np.float32(0.5))
         fine_y = np.int32(at_y * one + np.float32(0.5))
-        left, top = fine_x // steps, fine_y // steps
-        parts[0, x], parts[1, x] = fine_x % steps, fine_y % steps
+        phases[x] = fine_y % steps * steps + fine_x % steps
         nearest[x] = (fine_y + half) // steps * np.int32(width) + (fine_x + half) // steps
-        places[x] = top * np.int32(width + 1) + left if inside else np.int32(-1)
+        places[x] = fine_y // steps * np.int32(width + 1) + fine_x // steps if inside else np.int32(-1)
 
 
 @njit(cache=True, nogil=True)
 def _add(packed, own, weight, disparity, tolerance, stride, located, lanes, seen):  # type: ignore[no-untyped-def]
     """Add what a camera sees of one row of the view, by its weight."""
-    places, nearest, parts = located
-    one, below = np.uintp(1), np.uintp(stride)
+    places, nearest, phases = located
+    shares, below = SHARES.ravel(), np.uintp(stride)
     for x in range(disparity.size):
-        if places[x] < 0 or abs(own[np.uintp(nearest[x])] - disparity[x]) > tolerance:
-            continue
-        place = np.uintp(places[x])
-        right, down = np.uint64(parts[0, x]), np.uint64(parts[1, x])
-        both = right * down
-        right, down = right * np.uint64(STEPS), down * np.uint64(STEPS)
-        fetched = (
-            packed[place] * (np.uint64(STEPS * STEPS) + both - right - down)
-            + packed[place + one] * (right - both)
-            + packed[place + below] * (down - both)
-            + packed[place + below + one] * both
-        )
-        lanes[x] += (((fetched + HALVES) >> np.uint64(8)) & LANES) * weight
-        seen[x] += 1
+        if places[x] >= 0 and abs(own[np.uintp(nearest[x])] - disparity[x]) <= tolerance:
+            place, phase = np.uintp(places[x]), np.uintp(phases[x])
+            add_lanes(packed, shares, lanes, np.uintp(x), place, below, phase, weight)
+            seen[x] += 1
 
 
 @njit(cache=True, nogil=True)
@@ -106,15 +106,16 @@ def blend(
         weights: uint64 (N,), above 0, in all at most WEIGHTS.
         view_disparity: float32 (H, W), known everywhere.
         tolerance: px within which disparities are one surface.
-        out: uint8 (H, W, 3) RGB, rows first..last-1 overwritten; black where no camera sees the pixel.
+        out: uint8 (H, W, 3) RGB, C-contiguous, rows first..last-1 overwritten; black where no camera
+            sees the pixel.
         seen_by: uint8 (H, W), overwritten with the number of cameras; 0 where none sees the pixel.
     """
     height, width = view_disparity.shape
     pixels, own = packed.ravel(), maps.ravel()
     plane, plane_map = (height + 1) * (width + 1), height * width
-    near, lane = np.float32(tolerance), np.uint64(0xFFFF)
+    near, flat = np.float32(tolerance), out.ravel()
     places, nearest = np.empty(width, np.int32), np.empty(width, np.int32)
-    parts, lanes = np.empty((2, width), np.int32), np.empty(width, np.uint64)
+    phases, lanes = np.empty(width, np.int32), np.empty(width, np.uint64)
     for y in range(first, last):
         disparity, seen = view_disparity[y], seen_by[y]
         lanes[:] = 0
@@ -122,7 +123,7 @@ def blend(
         for i in range(cameras.size):
             camera = cameras[i]
             shift = shifts[i, 0], shifts[i, 1]
-            _locate(y, disparity, shift, (height, width), places, nearest, parts)
+            _locate(y, disparity, shift, (height, width), places, nearest, phases)
             _add(
                 pixels[camera * plane : (camera + 1) * plane],
                 own[camera * plane_map : (camera + 1) * plane_map],
@@ -130,13 +131,9 @@ def blend(
                 disparity,
                 near,
                 width + 1,
-                (places, nearest, parts),
+                (places, nearest, phases),
                 lanes,
                 seen,
             )
         for x in range(width):
-            colour = lanes[x]
-            scale = np.float32(1) / np.float32(max(colour >> np.uint64(48), np.uint64(1)))
-            for channel in range(3):
-                value = np.float32((colour >> np.uint64(16 * channel)) & lane)
-                out[y, x, channel] = np.uint8(value * scale + np.float32(0.5))
+            store_lanes(lanes[x], flat, np.uintp(3) * np.uintp(y * width + x))

@@ -15,6 +15,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 FOUR = ir.VectorType(ir.FloatType(), 4)
+SHORT = ir.IntType(16)
 WORD_BYTES = 4
 """Loads begin at any float32."""
 
@@ -117,4 +118,132 @@ def _add_fetched(_typing, luma, colour, polynomial, sums, at, place, stride, par
     return types.void(*arguments), generate
 
 
+def _clip(builder, numbers, low, high):  # type: ignore[no-untyped-def]
+    """Numbers kept within low..high."""
+    for sign, limit in ((">", low), ("<", high)):
+        edge = ir.Constant(FOUR, [limit] * 4)
+        numbers = builder.select(builder.fcmp_ordered(sign, numbers, edge), numbers, edge)
+    return numbers
+
+
+def _store_bytes(builder, numbers, pointer, index):  # type: ignore[no-untyped-def]
+    """Store the first three of four numbers of 0..255 as bytes, rounded down."""
+    whole = builder.fptosi(numbers, ir.VectorType(ir.IntType(32), 4))
+    bytes_ = builder.trunc(whole, ir.VectorType(ir.IntType(8), 4))
+    for lane in range(3):
+        byte = builder.extract_element(bytes_, ir.Constant(ir.IntType(32), lane))
+        builder.store(byte, builder.gep(pointer, [builder.add(index, ir.Constant(index.type, lane))]))
+
+
+def _add_lanes(_typing, packed, shares, lanes, at, place, stride, phase, weight):  # type: ignore[no-untyped-def]
+    """Add weight * (red, green, blue, 1) of a place between pixels to `lanes[at]`, in whole numbers.
+
+    Args:
+        packed: flat uint64, four lanes of 16 bits a pixel.
+        shares: uint16 (phases, 16), in 256ths, those of the upper two pixels four times each, then the lower.
+        lanes: flat uint64.
+        at, place, stride: uintp; index into `lanes`, of the pixel up left in `packed`, pixels of its rows.
+        phase: uintp, row of `shares`.
+        weight: uint64, below 2^16.
+    """
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        packed, shares, lanes = (
+            context.make_array(kind)(context, builder, value).data
+            for kind, value in zip(signature.args[:3], values[:3], strict=True)
+        )
+        at, place, stride, phase, weight = values[3:]
+        four, eight = ir.VectorType(SHORT, 4), ir.VectorType(SHORT, 8)
+
+        def pixels(pointer, index, kind):  # type: ignore[no-untyped-def]
+            return builder.bitcast(builder.gep(pointer, [index]), kind.as_pointer())
+
+        row = builder.mul(phase, ir.Constant(phase.type, 16))
+        total = None
+        for step, half in ((None, 0), (stride, 8)):
+            index = place if step is None else builder.add(place, step)
+            share = builder.add(row, ir.Constant(row.type, half))
+            product = builder.mul(
+                builder.load(pixels(packed, index, eight), align=8),
+                builder.load(pixels(shares, share, eight), align=2),
+            )
+            total = product if total is None else builder.add(total, product)
+        none = ir.Constant(eight, ir.Undefined)
+        left, right = (
+            builder.shuffle_vector(total, none, ir.Constant(ir.VectorType(ir.IntType(32), 4), list(part)))
+            for part in (range(4), range(4, 8))
+        )
+        summed = builder.add(builder.add(left, right), ir.Constant(four, [128] * 4))
+        fetched = builder.lshr(summed, ir.Constant(four, [8] * 4))
+        one = builder.insert_element(
+            ir.Constant(four, ir.Undefined), builder.trunc(weight, SHORT), ir.Constant(ir.IntType(32), 0)
+        )
+        zero = ir.Constant(ir.VectorType(ir.IntType(32), 4), [0] * 4)
+        factors = builder.shuffle_vector(one, ir.Constant(four, ir.Undefined), zero)
+        where = pixels(lanes, at, four)
+        builder.store(
+            builder.add(builder.load(where, align=8), builder.mul(fetched, factors)), where, align=8
+        )
+        return context.get_dummy_value()
+
+    return types.void(packed, shares, lanes, at, place, stride, phase, weight), generate
+
+
+def _store_lanes(_typing, lanes, pixels, place):  # type: ignore[no-untyped-def]
+    """Store as RGB what four lanes of 16 bits (uint64) hold, divided by the uppermost, rounded.
+
+    Args:
+        lanes: weighted sums of red, green and blue, and the sum of weights; 0 makes black.
+        pixels: flat uint8, stored from index `place` (uintp) on.
+    """
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        pixels = context.make_array(signature.args[1])(context, builder, values[1]).data
+        lanes = builder.bitcast(values[0], ir.VectorType(ir.IntType(16), 4))
+        numbers = builder.sitofp(builder.zext(lanes, ir.VectorType(ir.IntType(32), 4)), FOUR)
+        weight = builder.extract_element(numbers, ir.Constant(ir.IntType(32), 3))
+        one = ir.Constant(ir.FloatType(), 1.0)
+        none = builder.fcmp_ordered("<", weight, one)
+        scale = _fill(builder, builder.fdiv(one, builder.select(none, one, weight)))
+        rounded = _add_product(builder, ir.Constant(FOUR, [0.5] * 4), numbers, scale)
+        _store_bytes(builder, rounded, pixels, values[2])
+        return context.get_dummy_value()
+
+    return types.void(lanes, pixels, place), generate
+
+
+def _store_colour(_typing, sums, at, pixels, place):  # type: ignore[no-untyped-def]
+    """Store a pixel as RGB, rounded and kept within 0..255.
+
+    Args:
+        sums: flat float32; weighted sums of Y, R - Y and B - Y and the sum of weights, from index `at`
+            (uintp) on. Where no weight is, the pixel is black.
+        pixels: flat uint8, stored from index `place` (uintp) on.
+    """
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        sums, pixels = (
+            context.make_array(kind)(context, builder, value).data
+            for kind, value in zip(signature.args[::2], values[::2], strict=True)
+        )
+        found = _load(builder, sums, values[1])
+        weight = builder.extract_element(found, ir.Constant(ir.IntType(32), 3))
+        none = builder.fcmp_ordered("==", weight, ir.Constant(ir.FloatType(), 0.0))
+        one = ir.Constant(ir.FloatType(), 1.0)
+        scale = builder.fdiv(one, builder.select(none, one, weight))
+        found = builder.fmul(found, _fill(builder, scale))
+        colour = _pick(builder, found, 0, 0, 0, 0)
+        for lane, parts in ((1, [1.0, -0.299 / 0.587, 0.0, 0.0]), (2, [0.0, -0.114 / 0.587, 1.0, 0.0])):
+            difference = _pick(builder, found, lane, lane, lane, lane)
+            colour = _add_product(builder, colour, difference, ir.Constant(FOUR, parts))
+        rounded = builder.fadd(colour, ir.Constant(FOUR, [0.5] * 4))
+        _store_bytes(builder, _clip(builder, rounded, 0.0, 255.0), pixels, values[3])
+        return context.get_dummy_value()
+
+    return types.void(sums, at, pixels, place), generate
+
+
 add_fetched: Any = intrinsic(_add_fetched)
+store_colour: Any = intrinsic(_store_colour)
+store_lanes: Any = intrinsic(_store_lanes)
+add_lanes: Any = intrinsic(_add_lanes)

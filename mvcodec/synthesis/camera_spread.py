@@ -10,6 +10,7 @@ by side (b = 1 cell) and across a cell (b^2 = 2) tell apart.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import combinations
 
 import cv2
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from mvcodec.array import Position, Viewpoint
 from mvcodec.frames import DecodedSet
+from mvcodec.workers import run_all
 
 FALLBACK = 0.4
 """Where cameras stand in one line, which can't tell noise from misplacement."""
@@ -51,7 +53,7 @@ def measure_spread(decoded: DecodedSet) -> float:
     """
     pairs_beside, pairs_across = _pairs(decoded)
     cameras = {camera for pair in pairs_beside + pairs_across for camera in pair}
-    lumas = {camera: _luma(decoded, camera) for camera in cameras}
+    lumas = dict(zip(cameras, run_all(partial(_luma, decoded), cameras), strict=True))
     beside = _mean_difference(decoded, lumas, pairs_beside)
     across = _mean_difference(decoded, lumas, pairs_across)
     if beside is None or across is None:
@@ -88,7 +90,7 @@ def _luma(decoded: DecodedSet, camera: Position) -> NDArray[np.uint8]:
 def _mean_difference(
     decoded: DecodedSet, lumas: Mapping[Position, NDArray[np.uint8]], pairs: Sequence[Pair]
 ) -> float | None:
-    found = [_difference(decoded, lumas, *pair) for pair in pairs]
+    found = run_all(lambda pair: _difference(decoded, lumas, *pair), pairs)
     known = [value for value in found if value is not None]
     return float(np.mean(known)) if known else None
 

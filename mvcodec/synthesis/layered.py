@@ -184,5 +184,6 @@ class Layered:
             pixels,
             seen_by,
         )
-        view_holes.paint_holes(pixels, disparity, seen_by, settings.tolerance_px, settings.hole_reach_px)
+        painting = pixels, disparity, seen_by, settings.tolerance_px, settings.hole_reach_px
+        run_in_bands(disparity.shape[0], view_holes.paint_holes, *painting)
         return pixels, seen_by

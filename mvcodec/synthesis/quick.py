@@ -77,7 +77,8 @@ class Quick:
             pixels,
             seen_by,
         )
-        view_holes.paint_holes(pixels, disparity, seen_by, TOLERANCE_PX, HOLE_REACH_PX)
+        painting = pixels, disparity, seen_by, TOLERANCE_PX, HOLE_REACH_PX
+        run_in_bands(disparity.shape[0], view_holes.paint_holes, *painting)
         return RenderedView(viewpoint, pixels, disparity, seen_by)
 
     def _prepared(self, decoded: DecodedSet, viewpoint: Viewpoint) -> CellCameras:

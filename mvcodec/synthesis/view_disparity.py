@@ -67,7 +67,13 @@ def view_disparity(
         ballot.denial,
         voted,
     )
-    cleaned = np.asarray(cv2.medianBlur(voted, 3), np.float32)
-    run_in_bands(height, view_depth.restore_thin, voted, ballot.tolerance_px, cleaned)
-    run_in_bands(height, view_depth.fill_background, cleaned, background_px)
+    cleaned = np.empty((height, width), np.float32)
+
+    def clean(first: int, last: int) -> None:
+        above, below = max(first - 1, 0), min(last + 1, height)  # the median asks one row beyond the band
+        cleaned[first:last] = cv2.medianBlur(voted[above:below], 3)[first - above : last - above]
+        view_depth.restore_thin(voted, ballot.tolerance_px, cleaned, first, last)
+        view_depth.fill_background(cleaned, background_px, first, last)
+
+    run_in_bands(height, clean)
     return cleaned

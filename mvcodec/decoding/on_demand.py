@@ -1,0 +1,46 @@
+"""Pictures and maps of a frame set that are made when somebody looks at them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Generic, TypeVar
+
+from mvcodec.array import Position
+from mvcodec.workers import Job
+
+Coded = TypeVar("Coded")
+Made = TypeVar("Made")
+
+
+class OnDemand(Mapping[Position, Made], Generic[Coded, Made]):
+    """What is coded of each camera, made into what is wanted of it by whoever looks first. Thread-safe.
+
+    A view needs the cameras around it, and frame sets that are only passed on the way to another one need
+    none.
+
+    Args:
+        coded: by camera; let go of once it is made.
+        make: takes a camera and what is coded of it.
+    """
+
+    def __init__(self, coded: Mapping[Position, Coded], make: Callable[[Position, Coded], Made]) -> None:
+        self._cameras = tuple(coded)
+        self._waiting = {camera: Job(partial(make, camera, found), ()) for camera, found in coded.items()}
+        self._made: dict[Position, Made] = {}
+
+    def __getitem__(self, camera: Position) -> Made:
+        job = self._waiting.get(camera)
+        if job is not None:
+            self._made[camera] = job.result()
+            self._waiting.pop(camera, None)
+        return self._made[camera]
+
+    def __contains__(self, camera: object) -> bool:
+        return camera in self._cameras
+
+    def __iter__(self) -> Iterator[Position]:
+        return iter(self._cameras)
+
+    def __len__(self) -> int:
+        return len(self._cameras)
