@@ -72,6 +72,7 @@ def test_segments_give_the_file_of_one_process_though_a_worker_is_killed(
     assert record["last_task"]["result"]["frames"] == FRAMES
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_finished_segments_and_the_next_run_uses_them(
     cluster: str, array: Path, whole: bytes, tmp_path: Path
 ) -> None:

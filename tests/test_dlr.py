@@ -203,7 +203,7 @@ def test_unknown_names_and_bad_settings_are_refused() -> None:
 def test_help_and_errors_name_the_refinements(command: str) -> None:
     choices = matcher_choices()
     assert choices.startswith("one of joint, ")
-    assert choices.endswith("adcensus, with +dlr or +dlr-thesis behind it if wanted")
+    assert choices.endswith("given, with +dlr or +dlr-thesis behind it if wanted")
     run = [sys.executable, "-m", "mvcodec", command, "--help"]
     shown = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert choices in " ".join(shown.split()).replace("dlr- thesis", "dlr-thesis")

@@ -24,6 +24,8 @@ from mvcodec.capture.live_clock import ArrivalClock, common_clock
 from mvcodec.container import read_info
 from mvcodec.errors import InputError, SettingError
 
+pytestmark = pytest.mark.slow  # cameras send in real time
+
 Taken = tuple[list[list[int]], list[int], list[str]]
 
 

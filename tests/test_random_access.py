@@ -117,7 +117,7 @@ def test_the_command_decodes_a_url_and_reports_what_it_read(content: bytes, url:
     report = json.loads(succeeds(*arguments))
     assert (report["frames"], report["bytes"]) == (1, len(content))
     assert 0 < report["bytes_read"] < len(content) / 3
-    assert "no such file" in fails(1, "decode", url.replace("x.mcap", "y.mcap"), tmp_path / "out")
+    assert "no such file" in fails(1, "decode", url.replace("x.mcap", "y.mcap"), tmp_path / "none")
 
 
 def test_a_server_without_ranges_is_named(url: str) -> None:

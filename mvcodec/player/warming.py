@@ -8,9 +8,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mvcodec.array import Calibration, CameraArray, Viewpoint
+from mvcodec.decoding.derived_maps import derive_map
 from mvcodec.frames import DecodedSet, DisparityMap
 from mvcodec.kernels.compiled_code import on_first_compilation
+from mvcodec.stream import map_cameras
 from mvcodec.synthesis.synthesizer import Synthesizer
+from mvcodec.video.codec import Planes
+from mvcodec.video.colour import to_picture
+from mvcodec.video.map_size import enlarged
 
 WIDTH, HEIGHT = 64, 48
 RANGE_PX = (0.0, 8.0)
@@ -33,8 +38,19 @@ def warm_up_beside(
 def warm_up(makers: Sequence[Callable[[], Synthesizer]]) -> None:
     """Render one small view by each synthesizer: its kernels are the same for all sizes."""
     decoded = _small_set()
+    _decode_little(decoded)
     for make in makers:
         make().render(decoded, Viewpoint(0.4, 0.6))
+
+
+def _decode_little(decoded: DecodedSet) -> None:
+    """What decoding does with pictures and maps when they are first looked at."""
+    grey = np.full((HEIGHT, WIDTH), 128, np.uint8)
+    chroma = np.full((HEIGHT // 2, WIDTH // 2), 128, np.uint8)
+    picture = to_picture(Planes(grey, chroma, chroma), WIDTH, HEIGHT)
+    small = np.full((HEIGHT // 2, WIDTH // 2), RANGE_PX[0], np.float32)
+    sent = {camera: enlarged(small, picture) for camera in map_cameras(decoded.array, "alternate")}
+    derive_map(decoded.array, sent, RANGE_PX, (0, 1))
 
 
 def _small_set() -> DecodedSet:

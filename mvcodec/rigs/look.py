@@ -29,7 +29,7 @@ Vectors = NDArray[np.float64]
 APART_PX = 0.75
 """Neighbours' rows (columns) that are farther apart are told of."""
 
-MENDS = "`mvcodec rectify`, or `mvcodec encode --rig auto`, mends that"
+MENDS = "`mvcodec rectify` mends that"
 
 _MOST_SIDE, _MOST_CAMERAS = 4, 25
 _MANY_CAMERAS = 9
