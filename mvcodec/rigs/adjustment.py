@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from mvcodec.array import CameraArray
 from mvcodec.rigs.features import Tracks
 
 Vectors = NDArray[np.float64]
@@ -38,6 +37,8 @@ _STEP = 1e-6
 class Priors:
     """How much the cameras are expected to differ from ideal ones: standard deviations.
 
+    They hold for most rigs; one that differs more in some respect is told by its pictures (Cauchy's loss).
+
     Attributes:
         angle_rad: of each angle.
         pitch_rad: of the mean turn around the line of cameras of a single row or column, which nothing shows.
@@ -52,15 +53,15 @@ class Priors:
 
     angle_rad: float = 0.2
     pitch_rad: float = 1e-4
-    focal: float = 0.2
-    focal_each: float = 0.02
+    focal: float = 0.02
+    focal_each: float = 0.01
     k1: float = 0.3
-    k2: float = 0.05
-    k1_each: float = 0.03
-    k2_each: float = 0.01
-    place_steps: float = 0.01
+    k2: float = 0.03
+    k1_each: float = 0.02
+    k2_each: float = 0.003
+    place_steps: float = 0.006
     stretch: float = 0.1
-    centre: float = 0.004
+    centre: float = 0.0015
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,11 +101,6 @@ class Adjusted:
     tracks: Tracks
     residual_px: Vectors
     inverse_depth: Vectors
-
-
-def scene_priors(array: CameraArray) -> Priors:
-    """What is expected of an ordinary rig: a focal length that is given is good to some percent."""
-    return Priors(focal=0.02) if array.calibration.given else Priors()
 
 
 def adjust(
@@ -178,13 +174,18 @@ class _Problem:
     def _gauge_rows(self) -> Vectors:
         """(G, unknowns): what no picture shows, and is 0 by choice.
 
-        The axes are those of the grid that the cameras stand on: their displacements don't turn it. A
-        single line of cameras says nothing of turns around itself: the mean one is 0.
+        The axes, the steps and the origin are those of the grid that the cameras stand on: their
+        displacements don't turn, stretch or move it. A single line of cameras says nothing of turns
+        around itself: the mean one is 0.
         """
         x, y = (self._grid - self._grid.mean(axis=0)).T
         rows = []
         for displacement in (
+            np.column_stack([0 * x + 1, 0 * x, 0 * x]),
+            np.column_stack([0 * x, 0 * x + 1, 0 * x]),
             np.column_stack([0 * x, 0 * x, 0 * x + 1]),
+            np.column_stack([x, 0 * x, 0 * x]),
+            np.column_stack([0 * x, y, 0 * x]),
             np.column_stack([0 * x, 0 * x, x]),
             np.column_stack([0 * x, 0 * x, y]),
             np.column_stack([-y, x, 0 * x]),
@@ -213,7 +214,8 @@ class _Problem:
     def solved(self, values: Vectors, tracks: Tracks, noise_px: float) -> Vectors:
         """The unknowns that explain the points best; observations count less beyond twice the noise."""
         seen = np.repeat(tracks.seen.ravel(), 2)
-        points = int(np.count_nonzero(seen))
+        # A camera may differ a lot in some respect: priors count less from there on, like wrong matches.
+        doubtful = int(np.count_nonzero(seen)) + self.unknowns
 
         def residuals(values: Vectors) -> Vectors:
             residual, _ = self.reprojected(self.cameras(values), tracks)
@@ -225,8 +227,8 @@ class _Problem:
 
         def loss(squares: Vectors) -> Vectors:
             rho = np.stack([squares, np.ones_like(squares), np.zeros_like(squares)])
-            root = np.sqrt(1 + squares[:points] / 4)
-            rho[:, :points] = 8 * (root - 1), 1 / root, -1 / (8 * root**3)
+            more = 1 + squares[:doubtful] / 4
+            rho[:, :doubtful] = 4 * np.log(more), 1 / more, -0.25 / more**2
             return rho
 
         found = least_squares(residuals, values, jacobian, loss=loss, max_nfev=15, ftol=1e-4, xtol=1e-5)

@@ -12,7 +12,7 @@ import numpy as np
 from mvcodec.capture.source import ArraySource
 from mvcodec.errors import InputError
 from mvcodec.frames import FrameSet
-from mvcodec.rigs.adjustment import adjust, scene_priors
+from mvcodec.rigs.adjustment import adjust
 from mvcodec.rigs.calibration_files import KnownCamera, read_cameras
 from mvcodec.rigs.colour_match import matched_colours
 from mvcodec.rigs.features import PairCount, Tracks, find_tracks
@@ -89,7 +89,7 @@ def calibrate_from_scene(source: ArraySource, chosen: range, wishes: Wishes | No
     check_shared(every, source.name)
     grid = np.array([(col, row * array.rho) for row, col in array.positions], np.float64)
     size = array.width, array.height
-    adjusted = adjust(every, grid, size, array.calibration.fx_px, scene_priors(array))
+    adjusted = adjust(every, grid, size, array.calibration.fx_px)
     rig = rig_from_adjusted(array, adjusted, wishes.crop, wishes.size)
     return _finished(rig, frame_sets, every, adjusted.tracks, pairs)
 

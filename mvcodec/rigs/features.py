@@ -22,6 +22,12 @@ RATIO = 0.8
 MAGSAC_PX = 3.0
 """How far off a match may be from the two cameras' epipolar geometry before lenses are known."""
 
+STILL_PX, STILL_SHARE = 1.0, 0.5
+"""A rig stands still where so many features are so near to where they were."""
+
+LEAST_STILL_PX = 0.15
+"""What moves less than that from frame to frame counts as still."""
+
 FEWEST = 12
 """Matches that two pictures must share to count as matched."""
 
@@ -41,6 +47,10 @@ class Features:
     xy_px: NDArray[np.float64]
     angles_deg: NDArray[np.float64]
     descriptors: NDArray[np.float32]
+
+    def kept(self, chosen: NDArray[np.bool_]) -> Features:
+        """Some of them."""
+        return Features(self.xy_px[chosen], self.angles_deg[chosen], self.descriptors[chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,18 +151,60 @@ def find_tracks(
     order = tuple(cameras)
     pairs = neighbours(order)
     parts, counts = [], {pair: [0, 0] for pair in pairs}
-    for number, frame_set in enumerate(frame_sets):
-        pictures = [frame_set.pictures[camera] for camera in order]
-        found = dict(zip(order, run_all(find_features, pictures), strict=True))
+    pictures = [frame_set.pictures[camera] for frame_set in frame_sets for camera in order]
+    flat = run_all(find_features, pictures)
+    every = [
+        dict(zip(order, flat[at : at + len(order)], strict=True)) for at in range(0, len(flat), len(order))
+    ]
+    for number, found in enumerate(standing(every)):
         matched = run_all(_match_pair, [found[one] for one, _ in pairs], [found[other] for _, other in pairs])
         links = {}
-        for pair, (every, kept) in zip(pairs, matched, strict=True):
-            counts[pair][0] += every
+        for pair, (many, kept) in zip(pairs, matched, strict=True):
+            counts[pair][0] += many
             counts[pair][1] += len(kept)
             links[pair] = kept
         parts.append(linked(order, found, links, number))
     told = [PairCount(*pair, *counts[pair]) for pair in pairs]
     return _joined(order, parts), told
+
+
+def standing(every: Sequence[Mapping[Position, Features]]) -> list[dict[Position, Features]]:
+    """The features of several frames; where the rig stands still, those of the first that do so too.
+
+    A camera may be late: then whatever moves is somewhere else in its pictures. What stands still tells
+    the same in every frame.
+
+    Args:
+        every: the features of each camera, frame by frame.
+    """
+    if len(every) < 2:
+        return [dict(found) for found in every]
+    distances = [
+        {camera: _least_moved(camera, number, every) for camera in found}
+        for number, found in enumerate(every)
+    ]
+    merged = np.concatenate([far for found in distances for far in found.values()])
+    still = merged[merged < STILL_PX]
+    if still.size < STILL_SHARE * merged.size:
+        return [dict(found) for found in every]
+    bound = max(LEAST_STILL_PX, 4 * float(np.median(still)))
+    return [
+        {camera: features.kept(distances[0][camera] <= bound) for camera, features in every[0].items()}
+    ]
+
+
+def _least_moved(
+    camera: Position, number: int, every: Sequence[Mapping[Position, Features]]
+) -> NDArray[np.float64]:
+    """(N,): how far from each feature of a frame the nearest one of the frame beside it is, px."""
+    from scipy.spatial import cKDTree
+
+    here = every[number][camera]
+    there = every[number + 1 if number + 1 < len(every) else number - 1][camera]
+    if not len(here.xy_px) or not len(there.xy_px):
+        return np.full(len(here.xy_px), np.inf)
+    distance, _ = cKDTree(there.xy_px).query(here.xy_px)
+    return np.asarray(distance, np.float64)
 
 
 def _match_pair(one: Features, other: Features) -> tuple[int, NDArray[np.int64]]:
