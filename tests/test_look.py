@@ -104,10 +104,14 @@ def test_a_camera_upside_down_is_told() -> None:
     assert concern.text.startswith("camera 1,1")
 
 
+def moved_right(picture: Picture, by_px: int) -> Picture:
+    wider = cv2.copyMakeBorder(picture, 0, 0, by_px, 0, cv2.BORDER_REFLECT)
+    return np.asarray(wider[:, : picture.shape[1]], np.uint8)
+
+
 def test_points_behind_infinity_are_told_where_a_calibration_says_where_that_is() -> None:
     array, pictures = room(1, 2)
-    moved = cv2.copyMakeBorder(pictures[0, 1], 0, 0, 40, 0, cv2.BORDER_REFLECT)[:, : SIZE[0]]
-    assert kinds(array, pictures | {(0, 1): moved}) == ["behind infinity"]
+    assert kinds(array, pictures | {(0, 1): moved_right(pictures[0, 1], 25)}) == ["behind infinity"]
 
 
 def flat(value: int) -> Pictures:
@@ -127,11 +131,9 @@ def test_nothing_is_said_where_nothing_can_be_seen() -> None:
 
 def test_nothing_is_said_of_disparities_on_both_sides_of_zero() -> None:
     array, pictures = room(1, 2)
-    shift = 25
-    moved = cv2.copyMakeBorder(pictures[0, 1], 0, 0, shift, 0, cv2.BORDER_REFLECT)[:, : SIZE[0]]
     without = CameraArray(1, 2, *SIZE, 24.0, (0,), (0, 1), Calibration.nominal(*SIZE))
     assert array.real == without.real
-    assert kinds(without, pictures | {(0, 1): moved}) == []
+    assert kinds(without, pictures | {(0, 1): moved_right(pictures[0, 1], 25)}) == []
 
 
 def write(folder: Path, pictures: Pictures) -> Path:
@@ -159,8 +161,23 @@ def test_encode_warns_and_with_strict_it_stops(tmp_path: Path) -> None:
 @pytest.mark.skipif(not DATA.is_dir(), reason="../shared/data is not here")
 @pytest.mark.parametrize(
     "name",
-    "tsukuba cones teddy venus art moebius antinous bicycle kitti".split()
-    + "shop_s1 shop_s2 shop_v2 shop_v3 shop_v4 shop_17x17".split(),
+    [
+        "tsukuba",
+        "cones",
+        "teddy",
+        "venus",
+        "art",
+        "moebius",
+        "antinous",
+        "bicycle",
+        "kitti",
+        "shop_s1",
+        "shop_s2",
+        "shop_v2",
+        "shop_v3",
+        "shop_v4",
+        "shop_17x17",
+    ],
 )
 def test_nothing_is_said_of_real_arrays(name: str) -> None:
     source = open_input([DATA / name])

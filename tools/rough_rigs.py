@@ -5,21 +5,24 @@ from __future__ import annotations
 import argparse
 import json
 import resource
+import tempfile
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+import mvcodec
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture import resolve_frames
 from mvcodec.evaluation.metrics import psnr
-from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture
+from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.kernels.raycast import straightened
-from mvcodec.layers.refinement import make_matcher
 from mvcodec.rigs.calibration import Calibrated, calibrate_from_scene
 from mvcodec.rigs.features import find_tracks
 from mvcodec.rigs.remap import RectifiedSource, Rectifier, source_places
@@ -28,8 +31,6 @@ from mvcodec.rigs.rig import Rig
 from mvcodec.scenes.renderer import Optics
 from mvcodec.scenes.rough_rig import FLAWS, RoughCamera, RoughRigSettings, RoughScene
 from mvcodec.scenes.scene import RoomScene, SceneSettings
-from mvcodec.stereo.disparity_range import estimate_range
-from mvcodec.synthesis.synthesizers import make_synthesizer
 
 Vectors = NDArray[np.float64]
 FRAMES = 3
@@ -126,26 +127,44 @@ def measure(seed: int, grid: tuple[int, int], flaws: tuple[str, ...], ideal_db: 
 def ideal_db(grid: tuple[int, int]) -> float:
     """Mean luma PSNR of the virtual views of the ideal rig."""
     room = RoomScene(SceneSettings(grid, FRAMES))
-    decoded = _matched(SceneSource(room))
-    scores = [
-        _score(decoded, viewpoint, room.render(viewpoint, 1)[0], np.ones(3))
-        for viewpoint in _viewpoints(grid)
-    ]
-    return float(np.mean(scores))
+    truths = {viewpoint: room.render(viewpoint, 1)[0] for viewpoint in _viewpoints(grid)}
+    return _coded_db(SceneSource(room), truths)
 
 
 def _views_db(straight: RectifiedSource, scene: RoughScene, found: Calibrated) -> float:
-    decoded = _matched(straight)
     optics, turn = true_rectified_camera(found.rig, scene)
-    gains = np.exp(
-        np.mean([np.log(scene.cameras[at].gain * found.rig.cameras[at].gain) for at in scene.cameras], axis=0)
-    )
-    scores = []
+    truths = {}
     for viewpoint in _viewpoints((scene.array.rows, scene.array.cols)):
         place = (viewpoint.col, viewpoint.row, 0.0)
-        truth, _ = scene.room.look(place, 1, optics, turn)
-        scores.append(_score(decoded, viewpoint, truth, gains))
-    return float(np.mean(scores))
+        truths[viewpoint], _ = scene.room.look(place, 1, optics, turn)
+    return _coded_db(straight, truths)
+
+
+def _coded_db(source: SceneSource | RectifiedSource, truths: Mapping[Viewpoint, Picture]) -> float:
+    """Mean luma PSNR of views of the middle frame, coded as `mvcodec encode` does by default."""
+    array = source.array
+    (frame_set,) = source.frame_sets(slice(1, 2))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "rig.mcap"
+        mvcodec.encode([frame_set.pictures], path, calibration=array.calibration, rho=array.rho)
+        with mvcodec.open(path) as video:
+            views = {at: video.render(at.row, at.col) for at in truths}
+    return float(np.mean([_registered_db(truths[at], views[at]) for at in truths]))
+
+
+def _registered_db(truth: Picture, view: Picture) -> float:
+    """Luma PSNR once the best homography (Evangelidis and Psarakis 2008) and gain are taken out."""
+    one, other = (cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY) for picture in (view, truth))
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-7)
+    start = np.eye(3, dtype=np.float32)
+    _, warp = cv2.findTransformECC(one, other, start, cv2.MOTION_HOMOGRAPHY, criteria)
+    size = (view.shape[1], view.shape[0])
+    flags = cv2.INTER_LANCZOS4 | cv2.WARP_INVERSE_MAP
+    moved = cv2.warpPerspective(truth, warp, size, flags=flags, borderMode=cv2.BORDER_REFLECT)
+    inside = cv2.warpPerspective(np.full_like(other, 255), warp, size, flags=cv2.WARP_INVERSE_MAP) == 255
+    gain = float((moved.astype(float) * view).sum() / (moved.astype(float) ** 2).sum())
+    lit = np.clip(np.rint(moved * gain), 0, 255).astype(np.uint8)
+    return psnr(np.where(inside[..., None], lit, view), view)
 
 
 def true_rectified_camera(rig: Rig, scene: RoughScene) -> tuple[Optics, Vectors]:
@@ -181,20 +200,6 @@ def true_rectified_camera(rig: Rig, scene: RoughScene) -> tuple[Optics, Vectors]
 
 def _viewpoints(grid: tuple[int, int]) -> list[Viewpoint]:
     return [Viewpoint(row, col) for row, col in VIEWS[grid]]
-
-
-def _matched(source: SceneSource | RectifiedSource) -> DecodedSet:
-    array = source.array
-    (frame_set,) = source.frame_sets(slice(1, 2))
-    range_px = estimate_range(array, [frame_set], None)
-    maps = make_matcher("joint").match(array, frame_set.pictures, range_px)
-    return DecodedSet(array, 1, 1, frame_set.pictures, maps, range_px)
-
-
-def _score(decoded: DecodedSet, viewpoint: Viewpoint, truth: Picture, gains: Vectors) -> float:
-    view = make_synthesizer("layered").render(decoded, viewpoint).pixels
-    lit = np.clip(np.rint(truth * gains), 0, 255).astype(np.uint8)
-    return psnr(lit, view)
 
 
 def main() -> None:
