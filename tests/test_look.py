@@ -162,21 +162,8 @@ def test_encode_warns_and_with_strict_it_stops(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "tsukuba",
-        "cones",
-        "teddy",
-        "venus",
-        "art",
-        "moebius",
-        "antinous",
-        "bicycle",
-        "kitti",
-        "shop_s1",
-        "shop_s2",
-        "shop_v2",
-        "shop_v3",
-        "shop_v4",
-        "shop_17x17",
+        *("tsukuba", "cones", "teddy", "venus", "art", "moebius", "antinous", "bicycle", "kitti"),
+        *("shop_s1", "shop_s2", "shop_v2", "shop_v3", "shop_v4", "shop_17x17"),
     ],
 )
 def test_nothing_is_said_of_real_arrays(name: str) -> None:

@@ -183,6 +183,14 @@ def test_what_all_cameras_see_is_valid_in_all_of_them() -> None:
     assert all(Rectifier(replace(rig, rectified=sized)).valid(at).all() for at in rig.cameras)
 
 
+def test_cropping_moves_nothing_by_parts_of_a_pixel() -> None:
+    cameras = {at: a_camera((0, 0, 0), at) for at in ((0, 0), (0, 1))}
+    view = framed(cameras, SIZE, Rectified(*SIZE, 320.0, (0.0, 0.0)))
+    cx, cy = view.centre_px
+    assert view.focal_px == 320.0
+    assert ((cx - 159.5) % 1, (cy - 99.5) % 1) == (0.0, 0.0)
+
+
 def test_cameras_that_look_away_from_each_other_are_refused() -> None:
     cameras = {(0, 0): a_camera((0, 40, 0), (0, 0)), (0, 1): a_camera((0, -40, 0), (0, 1))}
     with pytest.raises(NothingInCommon, match="in common"):

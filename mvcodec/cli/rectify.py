@@ -18,6 +18,7 @@ from mvcodec.cli.paths import (
 )
 from mvcodec.cli.progress import progress
 from mvcodec.errors import SettingError
+from mvcodec.evaluation.rig_report import rig_report
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.output.atomic import write_bytes
 from mvcodec.rigs.calibration import Calibrated, Wishes, calibrate_from_files, calibrate_from_scene
@@ -77,6 +78,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=DEFAULT_INTERPOLATION,
         help="between pixels (default: %(default)s)",
     )
+    parser.add_argument(
+        "--report", type=local_path, metavar="rig.html", help="write a page with figures and pictures"
+    )
     add_frames(parser, "frames of the input to use")
     add_overwrite(parser)
     add_output_options(parser, "print the rig as JSON")
@@ -101,6 +105,8 @@ def run(arguments: argparse.Namespace) -> None:
     else:
         _write_folder(source, chosen, found, arguments)
         write_bytes(output / RIG_NAME, text.encode())
+    if arguments.report is not None:
+        write_bytes(arguments.report, rig_report(found, source.name).encode())
     if arguments.json:
         print(json.dumps(found.rig.document()))
     elif not arguments.quiet:

@@ -158,6 +158,21 @@ def agreeing_with(rig: Rig, tracks: Tracks) -> Tracks:
     return places
 
 
+def left_by_places_px(rig: Rig, tracks: Tracks) -> float:
+    """What cameras beside their places leave over, px: it depends on the distance, so that no turn mends it.
+
+    Of the camera that is farthest beside its place, at the 5 % of the points that are the farthest from the
+    typical distance.
+    """
+    view = rig.rectified
+    _, disparity = disparities(rectified_tracks(rig, tracks), view.rho)
+    away = np.abs(disparity / view.focal_px - view.typical_w)
+    beside = [
+        np.abs(camera.place[:2] - (at[1], at[0] * view.rho)).max() for at, camera in rig.cameras.items()
+    ]
+    return float(max(beside) * np.percentile(away, 95) * view.focal_px)
+
+
 def _finished(
     rig: Rig, frame_sets: list[FrameSet], every: Tracks, tracks: Tracks, pairs: list[PairCount]
 ) -> Calibrated:
@@ -171,6 +186,7 @@ def _finished(
         "points": len(tracks.seen),
         "observations": int(tracks.seen.sum()),
         "observations_left_out": int(every.seen.sum() - tracks.seen.sum()),
+        "left_by_places_px": left_by_places_px(rig, tracks),
         "before_px": asdict(before),
         "after_px": asdict(after),
     }

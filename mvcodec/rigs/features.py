@@ -188,9 +188,7 @@ def standing(every: Sequence[Mapping[Position, Features]]) -> list[dict[Position
     if still.size < STILL_SHARE * merged.size:
         return [dict(found) for found in every]
     bound = max(LEAST_STILL_PX, 4 * float(np.median(still)))
-    return [
-        {camera: features.kept(distances[0][camera] <= bound) for camera, features in every[0].items()}
-    ]
+    return [{camera: features.kept(distances[0][camera] <= bound) for camera, features in every[0].items()}]
 
 
 def _least_moved(

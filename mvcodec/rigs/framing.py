@@ -64,7 +64,10 @@ def framed(
         left, top = middle[0] - (wide - 1) / 2, middle[1] - (high - 1) / 2
         right, bottom = left + wide - 1, top + high - 1
     if size is None:
+        # Whole pixels of the plane: a camera that looks straight ahead keeps its pixels as they are.
         size = int(right - left + 1) // 2 * 2, int(bottom - top + 1) // 2 * 2
+        left, top = float(np.ceil(left)), float(np.ceil(top))
+        right, bottom = left + size[0] - 1, top + size[1] - 1
     scale = min(size[0] / (right - left + 1), size[1] / (bottom - top + 1))
     scale = 1.0 if abs(scale - 1) < 2 / min(size) else scale
     # Centres of pixels: the rectangle's own middle becomes that of the picture.
