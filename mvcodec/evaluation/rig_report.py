@@ -166,12 +166,21 @@ def _pictures(found: Calibrated) -> list[str]:
                     f"{when}: lines lead from where one camera shows points; circles are where the other does"
                 )
                 parts.append(_figure(drawn, text))
-    mean = np.mean([picture.astype(np.float32) for picture in straight.values()], axis=0)
+    view = found.rig.rectified
+    disparity = view.typical_w * view.focal_px
+    met = [
+        _moved(picture, disparity * at[1], disparity * view.rho * at[0]) for at, picture in straight.items()
+    ]
+    mean = np.mean([picture.astype(np.float32) for picture in met], axis=0)
     parts.append("<h2>All rectified pictures over each other</h2>")
-    parts.append(
-        _figure(np.rint(mean).astype(np.uint8), "what is at the typical distance is the least blurred")
-    )
+    parts.append(_figure(np.rint(mean).astype(np.uint8), "what is at the typical distance is sharp"))
     return parts
+
+
+def _moved(picture: Picture, right_px: float, down_px: float) -> Picture:
+    move = np.array([[1, 0, right_px], [0, 1, down_px]])
+    size = picture.shape[1], picture.shape[0]
+    return np.asarray(cv2.warpAffine(picture, move, size, borderMode=cv2.BORDER_REPLICATE), np.uint8)
 
 
 def _lines(
