@@ -34,7 +34,7 @@ demo: $(STAMP)
 	$(BIN)/python tools/demo.py $(if $(INPUT),--input "$(INPUT)") --out "$(OUT)"
 
 test: lint
-	cd web && $(NODE_ENV) npm test --silent
+	cd web && $(NODE_ENV) node build.mjs --tests && $(NODE_ENV) node --test ../build/web-tests/*.test.mjs
 	$(BIN)/pytest -n 2 --dist loadfile -m "not slow"
 
 test-slow: $(STAMP)
