@@ -15,7 +15,7 @@ from speed_measures import QP, REPEATS, Material, Row, material, stock_code, sto
 
 from mvcodec.array import Calibration, CameraArray
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
-from mvcodec.encoding.speed import SPEEDS
+from mvcodec.encoding.speed_choice import SPEEDS
 from mvcodec.layers.refinement import make_matcher
 from mvcodec.stereo.matcher import SelectiveMatcher
 from mvcodec.stream import map_cameras

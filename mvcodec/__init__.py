@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     )
     from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture, RenderedView
     from mvcodec.layers.refinement import make_matcher
-    from mvcodec.plugins import Plugin
+    from mvcodec.plugin_tables import Plugin
     from mvcodec.settings import setting
     from mvcodec.stereo.matcher import Matcher, PairMatcher
     from mvcodec.stream import Packet, StreamHeader
@@ -60,7 +60,7 @@ _MODULES = {
     " OutputError SettingError StreamClosed StreamError",
     "mvcodec.frames": "DecodedSet DisparityMap FrameSet Picture RenderedView",
     "mvcodec.layers.refinement": "make_matcher",
-    "mvcodec.plugins": "Plugin",
+    "mvcodec.plugin_tables": "Plugin",
     "mvcodec.settings": "setting",
     "mvcodec.stereo.matcher": "Matcher PairMatcher",
     "mvcodec.stream": "Packet StreamHeader",

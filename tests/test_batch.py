@@ -15,10 +15,10 @@ from command_line import COMMAND, fails, mvcodec, succeeds
 from dask_cluster import kill_a_busy_worker, running_cluster, wait_for
 from small_arrays import write_array
 
+from mvcodec.cluster.batch_inputs import find_recordings
 from mvcodec.cluster.connection import check_cluster
+from mvcodec.cluster.frame_segments import cut
 from mvcodec.cluster.places import Place
-from mvcodec.cluster.recordings import find_recordings
-from mvcodec.cluster.segments import cut
 from mvcodec.errors import InputError, SettingError
 
 pytestmark = pytest.mark.xdist_group("cluster")

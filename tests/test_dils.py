@@ -10,7 +10,7 @@ from plane_scene import Plane, PlaneScene, grid
 from mvcodec.array import Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, Picture
-from mvcodec.kernels import pairs
+from mvcodec.kernels import pair_rows
 from mvcodec.layers.dils_split import split
 from mvcodec.synthesis.dils import Dils, DilsSettings
 from mvcodec.synthesis.mlvs import View
@@ -121,21 +121,21 @@ def test_kernels_equal_their_twins(size: tuple[int, int], seed: int) -> None:
     right_shift = rng.integers(-9, 10, size).astype(np.int32)
     nearness = rng.integers(0, 5, size).astype(np.float32)
     usable = rng.random(size) > 0.3
-    source = pairs.forward_sources(shift, nearness, usable)
+    source = pair_rows.forward_sources(shift, nearness, usable)
     np.testing.assert_array_equal(source, pair_twins.forward_sources(shift, nearness, usable))
 
     left, right = rng.integers(0, 256, (2, *size, 3), dtype=np.uint8)
     left_seen, right_seen = rng.integers(0, 3, (2, *size), dtype=np.uint8)
     weight = float(rng.choice([0.0, 0.25, 0.5, 1.0]))
     arguments = (left, right, nearness, left_seen, right_seen, source, right_shift, weight)
-    fast = pairs.blend_pair(*arguments)
+    fast = pair_rows.blend_pair(*arguments)
     for got, expected in zip(fast, pair_twins.blend_pair(*arguments), strict=True):
         np.testing.assert_array_equal(got, expected, strict=True)
 
     known = source >= 0
-    nearest = pairs.nearest_known(known)
+    nearest = pair_rows.nearest_known(known)
     np.testing.assert_array_equal(nearest, pair_twins.nearest_known(known))
-    pixels, disparity = pairs.filled_along_rows(fast[0], fast[1], nearest)
+    pixels, disparity = pair_rows.filled_along_rows(fast[0], fast[1], nearest)
     y, x = np.arange(size[0])[:, None], np.where(nearest >= 0, nearest, np.arange(size[1]))
     np.testing.assert_array_equal(pixels, fast[0][y, x])
     np.testing.assert_array_equal(disparity, fast[1][y, x])

@@ -19,8 +19,8 @@ from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.kernels.growth import nearest_seeds
 from mvcodec.layers.dlr import DlrSettings, refine
+from mvcodec.layers.picture_segments import split_picture
 from mvcodec.layers.refinement import make_matcher, matcher_choices
-from mvcodec.layers.segments import split_picture
 from mvcodec.stereo.consistency import median
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
 

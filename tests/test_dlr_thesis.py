@@ -10,8 +10,8 @@ from stereo_scene import Planes, linear_or_grid
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.layers.dlr_thesis import ThesisDlrSettings, refine, refine_layer
+from mvcodec.layers.picture_segments import edge_map
 from mvcodec.layers.refinement import make_matcher
-from mvcodec.layers.segments import edge_map
 
 NEAR = np.s_[20:60, 40:90]
 SETTINGS = ThesisDlrSettings()

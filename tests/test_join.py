@@ -15,7 +15,7 @@ from small_arrays import write_array
 from mvcodec.conformance.validation import validate
 from mvcodec.container import McapReader, McapWriter, read_info
 from mvcodec.container.declared import DROPPED_KEY
-from mvcodec.container.join import join
+from mvcodec.container.joining import join
 from mvcodec.encoding.encoder import Encoder
 from mvcodec.errors import StreamError
 from mvcodec.stream import Packet

@@ -17,7 +17,7 @@ from mvcodec.encoding.encoder import Encoder
 from mvcodec.errors import OutputError
 from mvcodec.evaluation.remembered import MapSpool, Remembered
 from mvcodec.frames import DisparityMap, Picture
-from mvcodec.plugins import Plugin
+from mvcodec.plugin_tables import Plugin
 from mvcodec.stereo.matchers import MATCHERS
 
 SECONDS = 0.05

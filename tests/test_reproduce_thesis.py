@@ -14,8 +14,8 @@ from types import ModuleType
 import pytest
 from small_arrays import write_array
 from thesis import grid, maps, pairs, reasons
-from thesis.figures import LayerFigures, ViewFigures
 from thesis.lines import BETAS
+from thesis.thesis_figures import LayerFigures, ViewFigures
 
 from mvcodec.evaluation.regions import BadPixels
 

@@ -13,7 +13,7 @@ from stereo_scene import Planes, linear_or_grid
 from mvcodec.array import CameraArray, Position
 from mvcodec.container import read_info
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
-from mvcodec.encoding.speed import SPEEDS
+from mvcodec.encoding.speed_choice import SPEEDS
 from mvcodec.errors import SettingError
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stereo.matchers import MATCHERS

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -22,3 +23,10 @@ def actual_files() -> set[str]:
 def test_structure_names_every_file_and_no_other() -> None:
     assert actual_files() - listed_files() == set()
     assert listed_files() - actual_files() == set()
+
+
+def test_a_name_of_a_file_says_which_file_it_is() -> None:
+    """Commands have the names of what they call, and the design names three tools after their commands."""
+    commands = re.compile(r"mvcodec/cli/|tools/(encode|decode|play)\.py$")
+    names = Counter(Path(path).name for path in actual_files() if not commands.match(path))
+    assert {name: count for name, count in names.items() if count > 1} == {}

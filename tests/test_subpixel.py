@@ -8,7 +8,7 @@ import subpixel_twin
 from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap
-from mvcodec.kernels.subpixel import add_pull
+from mvcodec.kernels.subpixel_pull import add_pull
 from mvcodec.stereo.subpixel import MOST_PX, refine
 
 HEIGHT, WIDTH = 48, 56

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from small_arrays import photograph, picture, write_array
 from thesis import grid, maps, pairs
-from thesis.figures import LayerFigures, ThesisTables, ViewFigures
 from thesis.lines import BETAS, Line
+from thesis.thesis_figures import LayerFigures, ThesisTables, ViewFigures
 
 from mvcodec.errors import InputError
 from mvcodec.frames import DisparityMap, Picture

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from thesis import grid, maps, pairs, reasons
-from thesis.figures import LayerFigures, ViewFigures
 from thesis.lines import BETAS, LINES, SPANS
 from thesis.orderings import find_orderings
+from thesis.thesis_figures import LayerFigures, ViewFigures
 
 from mvcodec.evaluation.regions import BadPixels
 

@@ -19,13 +19,13 @@ from pathlib import Path
 from typing import TypeVar
 
 from thesis import grid, maps, pairs
-from thesis.figures import Step, ThesisTables
 from thesis.grid import GridRow, GridTable
 from thesis.lines import BETAS, SPANS
 from thesis.maps import THRESHOLDS_PX, MapTable
 from thesis.orderings import find_orderings
 from thesis.pairs import PairTable
 from thesis.reasons import Ordering
+from thesis.thesis_figures import Step, ThesisTables
 
 from mvcodec.cli.progress import progress
 from mvcodec.errors import MvCodecError, SettingError

@@ -14,10 +14,10 @@ from mvcodec.cli.arguments import join_negative_values
 from mvcodec.cli.cluster_options import add_cluster
 from mvcodec.cli.info import count
 from mvcodec.cli.progress import progress
-from mvcodec.cluster.batch import SEGMENTED, Batch, Job, Option, Progress, run_batch
+from mvcodec.cluster.batch_inputs import find_recordings
+from mvcodec.cluster.batch_run import SEGMENTED, Batch, Job, Option, Progress, run_batch
 from mvcodec.cluster.connection import connected, local_workers
 from mvcodec.cluster.places import Place
-from mvcodec.cluster.recordings import find_recordings
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.workers import check_threads, thread_count
 

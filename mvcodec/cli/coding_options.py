@@ -19,7 +19,7 @@ from mvcodec.cli.arguments import (
 from mvcodec.cli.paths import local_path
 from mvcodec.encoding.config import AUTO
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
-from mvcodec.encoding.speed import FOR_FILES, FOR_LIVE, SPEEDS
+from mvcodec.encoding.speed_choice import FOR_FILES, FOR_LIVE, SPEEDS
 from mvcodec.frames import FrameSet
 from mvcodec.layers.refinement import matcher_choices
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range

@@ -42,7 +42,7 @@ from mvcodec.container import McapWriter, StreamInfo, read_info
 from mvcodec.decoding.decoded_source import DecodedSource
 from mvcodec.depth import require_calibration
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
-from mvcodec.encoding.speed import FOR_LIVE
+from mvcodec.encoding.speed_choice import FOR_LIVE
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.output.live_view import LiveView
 

@@ -126,7 +126,7 @@ def _measured(
     """The points, measured in this process or by a cluster's workers."""
     if arguments.cluster is None:
         return run.measure()
-    from mvcodec.cluster.study import measure_on_cluster, opening_of
+    from mvcodec.cluster.cluster_study import measure_on_cluster, opening_of
 
     opening = opening_of(arguments.input, arguments.grid, arguments.real)
     with connected(arguments.cluster, arguments.retries) as client:

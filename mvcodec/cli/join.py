@@ -10,7 +10,7 @@ from mvcodec.cli.info import document, summary
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.safety import add_limits, limits_of
 from mvcodec.container import read_info
-from mvcodec.container.join import join
+from mvcodec.container.joining import join
 from mvcodec.errors import SettingError
 from mvcodec.output.atomic import replacing
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.layers.refinement import REFINEMENT_PLUGINS, SEPARATOR
-from mvcodec.plugins import Plugin, PluginTable
+from mvcodec.plugin_tables import Plugin, PluginTable
 from mvcodec.settings import did_you_mean, show
 from mvcodec.stereo.matchers import MATCHER_PLUGINS
 from mvcodec.synthesis.synthesizers import SYNTHESIZER_PLUGINS

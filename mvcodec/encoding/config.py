@@ -6,7 +6,7 @@ import math
 from dataclasses import InitVar, dataclass, fields
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.encoding.speed import FOR_FILES, SPEEDS
+from mvcodec.encoding.speed_choice import FOR_FILES, SPEEDS
 from mvcodec.errors import SettingError
 from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.matcher import Matcher

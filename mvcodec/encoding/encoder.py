@@ -55,7 +55,7 @@ class Encoder:
             header names config's.
         coded_before: frame sets of the same stream that another encoder codes, up to a keyframe. At a
             constant quantiser H.264 and AV1 then give the packets that one encoder for all would give, but
-            for the header's `first_frame`; see `mvcodec.container.join`.
+            for the header's `first_frame`; see `mvcodec.container.joining`.
 
     Raises:
         SettingError: a setting does not fit the array, or names an unknown matcher or preset.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.layers.dils_split import runs
-from mvcodec.layers.segments import Segments, split_picture
+from mvcodec.layers.picture_segments import Segments, split_picture
 from mvcodec.settings import check_settings, setting
 
 _MEDIAN_SIZE = 5

@@ -15,7 +15,7 @@ import numpy as np
 
 from mvcodec.frames import DisparityMap, Mask, Picture
 from mvcodec.layers.dils_split import THRESHOLD, average_px
-from mvcodec.layers.segments import edge_map
+from mvcodec.layers.picture_segments import edge_map
 from mvcodec.layers.splits import LAYER_SPLITS
 from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.consistency import fill_from_farther

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mvcodec.array import CameraArray, Position
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.layers import dlr, dlr_thesis
-from mvcodec.plugins import Chosen, Plugin, PluginTable
+from mvcodec.plugin_tables import Chosen, Plugin, PluginTable
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stereo.matchers import MATCHER_PLUGINS, MATCHERS, make_base_matcher
 from mvcodec.stereo.pairwise import transposed

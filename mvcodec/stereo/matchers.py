@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 from mvcodec.errors import SettingError
-from mvcodec.plugins import Plugin, PluginTable
+from mvcodec.plugin_tables import Plugin, PluginTable
 from mvcodec.stereo.adcensus import AdCensus, AdCensusSettings
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
 from mvcodec.stereo.given import Given, GivenSettings

@@ -42,7 +42,7 @@ def refine(
     Returns:
         float32 (H, W), px.
     """
-    from mvcodec.kernels.subpixel import add_pull
+    from mvcodec.kernels.subpixel_pull import add_pull
 
     pull, weight = np.zeros_like(disparity), np.zeros_like(disparity)
     for (other_grey, other_disparity), (by_x, by_y) in zip(partners, steps, strict=True):

@@ -35,10 +35,10 @@ def forward_pair(
         view's), and valid where there is a pixel, a filled one or not: the next level of MLVS works on
         filled pictures as on others, else the strips that no pair covers would stay black.
     """
-    from mvcodec.kernels import pairs
+    from mvcodec.kernels import pair_rows
 
-    source = pairs.forward_sources(shift_px, nearness, usable)
-    pixels, disparity, seen_by = pairs.blend_pair(
+    source = pair_rows.forward_sources(shift_px, nearness, usable)
+    pixels, disparity, seen_by = pair_rows.blend_pair(
         np.ascontiguousarray(left.pixels),
         np.ascontiguousarray(right.pixels),
         left.disparity.values_px,
@@ -48,8 +48,8 @@ def forward_pair(
         right_shift_px,
         left_weight,
     )
-    nearest = pairs.nearest_known(source >= 0)
-    filled, disparity = pairs.filled_along_rows(pixels, disparity, nearest)
+    nearest = pair_rows.nearest_known(source >= 0)
+    filled, disparity = pair_rows.filled_along_rows(pixels, disparity, nearest)
     if fill_holes:
         return View(filled, DisparityMap(disparity, nearest >= 0), seen_by)
     return View(pixels, DisparityMap(disparity, source >= 0), seen_by)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from mvcodec.plugins import Plugin, PluginTable
+from mvcodec.plugin_tables import Plugin, PluginTable
 from mvcodec.synthesis.dils import Dils, DilsSettings
 from mvcodec.synthesis.layered import Layered, LayeredSettings
 from mvcodec.synthesis.linear import Linear, LinearSettings

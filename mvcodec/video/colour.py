@@ -56,7 +56,7 @@ _FORWARD, _INVERSE = forward_matrix(), inverse_matrix()
 
 def to_planes(picture: Picture) -> Planes:
     """Convert uint8 (H, W, 3) RGB into planes of the next even size."""
-    from mvcodec.kernels.colour import rgb_to_yuv420
+    from mvcodec.kernels.colour_planes import rgb_to_yuv420
 
     rgb = pad_to_even(picture)
     height, width = rgb.shape[:2]
@@ -69,7 +69,7 @@ def to_planes(picture: Picture) -> Planes:
 
 def to_picture(planes: Planes, width: int, height: int) -> Picture:
     """Convert planes into uint8 (height, width, 3) RGB, cropping what was padded."""
-    from mvcodec.kernels.colour import yuv420_to_rgb
+    from mvcodec.kernels.colour_planes import yuv420_to_rgb
 
     rgb = np.empty((height, width, 3), np.uint8)
     yuv420_to_rgb(planes.y, planes.u, planes.v, _INVERSE, rgb)

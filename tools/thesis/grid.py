@@ -27,8 +27,8 @@ from mvcodec.synthesis.dils import Dils, DilsSettings
 from mvcodec.synthesis.linear import Linear, LinearSettings
 from mvcodec.synthesis.mlvs import Route
 from mvcodec.synthesis.synthesizer import Synthesizer
-from thesis.figures import LayerFigures, Step, ThesisTables, ViewFigures, no_step
 from thesis.lines import BETAS, LINES, SPANS, Line
+from thesis.thesis_figures import LayerFigures, Step, ThesisTables, ViewFigures, no_step
 
 FOLDER = "shop_17x17"
 LEVELS = (1, 2, 3)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mvcodec.array import Position
 from mvcodec.synthesis.mlvs import Route
-from thesis.figures import ThesisTables
+from thesis.thesis_figures import ThesisTables
 
 SPANS = {"1-to-5": 4, "1-to-9": 8, "1-to-17": 16}
 """Grid steps between the cameras of a cell, by the thesis's name."""

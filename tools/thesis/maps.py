@@ -19,7 +19,7 @@ from mvcodec.stereo.adcensus import AdCensus
 from mvcodec.stereo.consistency import median
 from mvcodec.stereo.fixed_window import FixedWindow, FixedWindowSettings
 from mvcodec.stereo.sgbm import Sgbm
-from thesis.figures import LayerFigures, Step, ThesisTables, no_step
+from thesis.thesis_figures import LayerFigures, Step, ThesisTables, no_step
 
 THRESHOLDS_PX = (0.5, 1.0, 2.0)
 _MEDIAN_SIZE = 11

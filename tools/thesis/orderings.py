@@ -7,12 +7,12 @@ from itertools import pairwise
 from statistics import fmean
 
 from thesis import reasons
-from thesis.figures import ViewFigures
 from thesis.grid import GridTable
 from thesis.lines import SPANS
 from thesis.maps import OUR_DLR, PAIRS, RAW, THESIS_DLR, MapTable
 from thesis.pairs import WINDOWS, PairTable
 from thesis.reasons import Ordering
+from thesis.thesis_figures import ViewFigures
 
 LEAST_DLR_CUT = 0.3
 ALIKE_SSIM = 0.03

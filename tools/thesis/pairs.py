@@ -20,7 +20,7 @@ from mvcodec.stereo.pairwise import Pairwise
 from mvcodec.synthesis.dils import Dils, DilsSettings
 from mvcodec.synthesis.linear import Linear, LinearSettings
 from mvcodec.synthesis.synthesizer import Synthesizer
-from thesis.figures import LayerFigures, Step, ThesisTables, ViewFigures, no_step
+from thesis.thesis_figures import LayerFigures, Step, ThesisTables, ViewFigures, no_step
 
 WINDOWS = {"Tsukuba": 11, "Cones": 21}
 """The thesis's SAD windows, of the sets that have a view in between here; Teddy and Venus have none."""

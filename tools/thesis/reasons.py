@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from statistics import fmean
 
-from thesis.figures import LayerFigures, ViewFigures
 from thesis.maps import PAIRS, RAW, THESIS_DLR, THESIS_DLR_LEVELS, MapTable
+from thesis.thesis_figures import LayerFigures, ViewFigures
 
 _MOST = 0.5
 

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import mvcodec
+from mvcodec.cluster.batch_inputs import Recording
+from mvcodec.cluster.frame_segments import cut
 from mvcodec.cluster.places import Place
-from mvcodec.cluster.recordings import Recording
-from mvcodec.cluster.segments import cut
 from mvcodec.cluster.tasks import PART, Outcome, join_parts, run_command
 from mvcodec.errors import OutputError
 
