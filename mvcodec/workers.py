@@ -11,8 +11,9 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from mvcodec.errors import SettingError
@@ -64,6 +65,31 @@ def threads(count: int | None) -> Iterator[None]:
 def thread_count() -> int:
     """How many threads compute at once here."""
     return _scope.get() or _Process.threads or _cores()
+
+
+@contextmanager
+def scheduling_kept() -> Iterator[None]:
+    """This thread, and the threads that begin inside of the block, end with the scheduling it has now.
+
+    Where a process may (as root), SVT-AV1 makes its own threads and its caller's real-time ones. All else
+    on the machine would wait for them, and each program that the process starts would inherit it.
+    """
+    if not hasattr(os, "sched_setscheduler"):
+        yield
+        return
+    policy, parameters, before = os.sched_getscheduler(0), os.sched_getparam(0), _thread_ids()
+    try:
+        yield
+    finally:
+        for thread in {0} | (_thread_ids() - before):
+            with suppress(ProcessLookupError):
+                if os.sched_getscheduler(thread) != policy:
+                    os.sched_setscheduler(thread, policy, parameters)
+
+
+def _thread_ids() -> set[int]:
+    tasks = Path("/proc/self/task")
+    return {int(task.name) for task in tasks.iterdir()} if tasks.is_dir() else set()
 
 
 def _cores() -> int:

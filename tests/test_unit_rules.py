@@ -26,6 +26,7 @@ from mvcodec.video.bits import NalError
 from mvcodec.video.codec import RateControl, VideoSettings
 from mvcodec.video.codecs import CODECS
 from mvcodec.video.reference_watch import ReferenceWatch
+from mvcodec.workers import scheduling_kept
 
 SIZE = (64, 48)
 COUNT = 12
@@ -50,6 +51,8 @@ def _stream(
     context.framerate, context.thread_count = Fraction(10), 1
     context.colorspace, context.color_primaries, context.color_trc = matrix, colours, transfer
     context.color_range, context.options = levels, CODECS[name].options(settings)
+    with scheduling_kept():
+        context.open(strict=False)
     packets = []
     for number in range(COUNT):
         picture = photograph("coffee")[60 + number : 108 + number, 90 + 2 * number : 154 + 2 * number]

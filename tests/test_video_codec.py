@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import cast
 
 import av
@@ -100,6 +102,17 @@ def test_bitrate_is_met(codec: Codec) -> None:
     coded = _coded(codec, _settings(bitrate_kbps=rate), 40)
     kbps = sum(len(picture.data) for picture in coded) * 8 / (40 / 10.0) / 1000
     assert 0.7 * rate < kbps < 1.3 * rate
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getscheduler"), reason="the system has no scheduling policies")
+def test_coding_leaves_the_process_its_scheduling(codec: Codec) -> None:
+    before = os.sched_getscheduler(0)
+    encoder = codec.encoder(_settings(qp=30))
+    encoder.push(to_planes(_picture(0)), keyframe=True)
+    # As root SVT-AV1 makes its threads and its caller real-time ones: nothing else would run beside them.
+    tasks = Path("/proc/self/task")
+    threads = [int(task.name) for task in tasks.iterdir()] if tasks.is_dir() else [0]
+    assert {os.sched_getscheduler(thread) for thread in threads} == {before}
 
 
 def test_h264_keyframes_are_idr_with_their_parameter_sets_and_one_slice() -> None:

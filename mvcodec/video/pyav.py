@@ -18,6 +18,7 @@ from av.video.reformatter import ColorPrimaries, ColorRange, Colorspace, ColorTr
 from mvcodec.errors import SettingError, StreamError
 from mvcodec.stream import TrackKind
 from mvcodec.video.codec import CodedPicture, Plane, Planes, VideoSettings
+from mvcodec.workers import scheduling_kept
 
 MAX_PIXELS = 1 << 26
 """Decoders refuse larger pictures before they take memory: twice 8K."""
@@ -79,6 +80,9 @@ class PyavEncoder:
 
     def _coded(self, frame: VideoFrame | None) -> list[CodedPicture]:
         try:
+            if not self._context.is_open:
+                with scheduling_kept():
+                    self._context.open(strict=False)
             packets = self._context.encode(frame)
         except FFmpegError as error:
             found = f"{self._library}, which refuses {self._settings.width}x{self._settings.height}"
