@@ -25,6 +25,7 @@ from skimage import data
 from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.container import McapReader, McapWriter
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
+from mvcodec.enhancement import EnhancementHeader
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stream import Packet, TrackKind
 from mvcodec.synthesis.track_decoding import StreamTracks
@@ -97,6 +98,11 @@ CASES: dict[str, Case] = {
     "predicted": Case(
         _calibrated(), (0, 1, 2), {"qp": 32, "gop": 2, "disparity_scale": 2, "prediction": "synthesis"}
     ),
+    "enhanced": Case(
+        _calibrated(),
+        (0, 1, 2),
+        {"qp": 40, "gop": 2, "disparity_scale": 2, "enhance": 30, "enhance_views": ((0, 1), (1, 2), (2, 3))},
+    ),
     "depth": Case(_calibrated(), (0, 1), {"qp": 34, "depth": True}),
     "hevc": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 30, "codec": "hevc", "gop": 2}),
     "av1": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 40, "codec": "av1", "gop": 2}),
@@ -109,7 +115,7 @@ CASES: dict[str, Case] = {
 def _frame_set(array: CameraArray, index: int) -> FrameSet:
     photograph = np.asarray(data.astronaut(), np.uint8)  # type: ignore[no-untyped-call]
     pictures = {}
-    for row, col in array.real:
+    for row, col in array.positions:
         top, left = 60 + 3 * row + index, 160 + 3 * col + 2 * index
         pictures[row, col] = photograph[top : top + array.height, left : left + array.width]
     return FrameSet(index, round(index * 1e9 / array.fps), pictures)
@@ -137,12 +143,13 @@ class _Pipe(io.BytesIO):
 
 
 def describe(content: bytes) -> dict[str, Any]:
-    """What a conformant decoder finds: stored header, and CRC-32 of planes (cropped rows, top to bottom).
+    """What a conformant decoder finds: stored headers, and CRC-32 of planes (cropped rows, top to bottom).
 
     Pictures are described by the planes that the video decoder puts out, which the codec's standard
     fixes bit by bit; maps by their code values; depth, where there is any, by its millimetres.
     """
-    with McapReader(io.BytesIO(content)) as reader:
+    layer: EnhancementHeader | None = None
+    with McapReader(io.BytesIO(content), layer=True) as reader:
         known, array = reader.header, reader.header.array
         map_width, map_height = small_size(array.width, array.height, known.disparity_scale)
         half = (slice((array.height + 1) // 2), slice((array.width + 1) // 2))
@@ -151,9 +158,11 @@ def describe(content: bytes) -> dict[str, Any]:
         for number, packet in reader.packets():
             if packet.track.kind is TrackKind.HEADER:
                 header = json.loads(packet.data)
+            elif packet.track.kind is TrackKind.LAYER:
+                layer = EnhancementHeader.from_json(packet.data, known, "layer")
             else:
                 sets.setdefault(number, []).append(packet)
-    tracks = StreamTracks(known)
+    tracks = StreamTracks(known, layer)
     frames: list[dict[str, Any]] = []
     for packets in sets.values():
         crcs = {}
@@ -165,7 +174,13 @@ def describe(content: bytes) -> dict[str, Any]:
             crcs[track.topic] = [zlib.crc32(p.tobytes()) for p in found]
         frames.append({"index": packets[0].index, "time_ns": packets[0].time_ns, "crc32": crcs})
     depth = _depth(content)
-    return {"header": header, "frame_sets": frames, **({"depth_crc32": depth} if depth else {})}
+    enhancement = {} if layer is None else {"enhancement": json.loads(layer.to_json())}
+    return {
+        "header": header,
+        **enhancement,
+        "frame_sets": frames,
+        **({"depth_crc32": depth} if depth else {}),
+    }
 
 
 def _depth(content: bytes) -> dict[str, list[int]]:

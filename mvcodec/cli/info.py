@@ -53,7 +53,11 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"  dropped      {count(info.dropped, 'frame set')}, left out while encoding live")
     if info.damages:
         print(f"  damage       in {count(info.damages, 'place')}; what is there is not counted above")
+    if info.layer is not None:
+        print(f"  enhancement  {_layer(info)}")
     for name, bits in asdict(info.bits).items():
+        if name == "enhancement" and info.layer is None:
+            continue
         print(f"  {name:11}  {bits / 1000:.1f} kbit")
 
 
@@ -86,6 +90,15 @@ def _maps(header: StreamHeader) -> str:
     return f"maps of {size} size from {count(len(header.map_cameras), 'camera')}"
 
 
+def _layer(info: StreamInfo) -> str:
+    """What the enhancement layer is, in words."""
+    assert info.layer is not None
+    virtual = len(info.header.array.positions) - len(info.header.array.real)
+    views = f"{len(info.layer.views)} of {count(virtual, 'virtual view')}"
+    quantizer = info.layer.settings.get("quantizer", "not stated")
+    return f"{views} coded from their synthesis, quantizer {quantizer}; the base plays without"
+
+
 def document(info: StreamInfo) -> dict[str, Any]:
     """What ``info --json`` prints."""
     array = info.header.array
@@ -105,6 +118,7 @@ def document(info: StreamInfo) -> dict[str, Any]:
             {"camera": list(each.camera), "from": [list(other) for other in each.references]}
             for each in info.header.predicted
         ],
+        "enhanced": [] if info.layer is None else [list(each.view) for each in info.layer.views],
         "version": info.header.version,
         "calibration": "given" if array.calibration.given else "nominal",
         "codec": info.header.codec,

@@ -35,9 +35,7 @@ class TalliedWriter(McapWriter):
         """What was written, once the writer is closed and something was."""
         assert self._header is not None
         total = 8 * self._output.written
-        texture = 8 * (self._bytes[TrackKind.TEXTURE] + self._bytes[TrackKind.PREDICTED])
-        disparity = 8 * self._bytes[TrackKind.DISPARITY]
-        bits = Bits.of(total, texture, disparity)
+        bits = Bits.of(total, {kind: 8 * self._bytes[kind] for kind in TrackKind})
         return StreamInfo(
             self._header, self.frame_count, bits, span_ns=(self._times_ns[0], self._times_ns[-1])
         )

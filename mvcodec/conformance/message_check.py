@@ -51,21 +51,27 @@ class MessageCheck:
         self._early_rig = schemas.rig_messages(replace(header.array, calibration=same))
         self._kinds = {message.topic: message.kind for message in self._rig}
         self._frames: dict[str, str] = {}
+        self.topics: set[str] = set()
+        self._codec = header.codec
         for track in header.tracks:
-            assert track.camera is not None
-            self._kinds[track.topic] = schemas.video_kind(track)
-            self._formats[track.topic] = schemas.video_format(track, header.codec)
-            self._frames[track.topic] = schemas.frame_id(track.camera)
+            self.expect(track)
         self._unseen = {HEADER_TRACK.topic, *self._kinds}
         self._size = header.array.width, header.array.height
         for camera in header.array.real:
             topic = Track(TrackKind.DEPTH, camera).topic
             self._kinds[topic], self._frames[topic] = "depth", schemas.frame_id(camera)
-        self.topics = {HEADER_TRACK.topic, *self._kinds}
+        self.topics |= {HEADER_TRACK.topic, *self._kinds}
         self._depths: set[str] | None = None  # topics with depth, which each frame set must have
         self._depths_now: set[str] = set()
         self._due: dict[tuple[str, bytes], int] | None = None
         self._key: Message | None = None
+
+    def expect(self, track: Track) -> None:
+        """Check the messages of a video track from now on."""
+        self.topics.add(track.topic)
+        self._kinds[track.topic] = schemas.video_kind(track)
+        self._formats[track.topic] = schemas.video_format(track, self._codec)
+        self._frames[track.topic] = schemas.track_frame(track)
 
     def begin_keyframe(self, record: Message) -> None:
         """Expect calibration and place of every camera at this time."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO, Literal, get_args
 
+from mvcodec.conformance.usable_tracks import UsableLayer, UsableTracks
 from mvcodec.container import McapReader, McapWriter
 from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.declared import DROPPED_KEY
@@ -15,10 +16,6 @@ from mvcodec.decoding.estimated_maps import can_be_estimated
 from mvcodec.enhancement import LAYER_TRACK
 from mvcodec.errors import SettingError, StreamError
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind
-from mvcodec.video.codecs import CODECS
-from mvcodec.video.map_size import track_sizes
-from mvcodec.video.reference_watch import ReferenceWatch
-from mvcodec.video.vp9_reference import unit_codec
 
 Incomplete = Literal["keep", "drop"]
 
@@ -34,7 +31,8 @@ class Recovered:
 
     Attributes:
         frames: frame sets in the new file.
-        incomplete: how many of them lack a camera's picture or map, or a depth image.
+        incomplete: how many of them lack a camera's picture or map, a depth image, or a view of the
+            enhancement layer.
         dropped: frame sets that were read but left out.
     """
 
@@ -72,7 +70,7 @@ def recover(
     ):
         assembler = Assembler(reader.name, tell)
         assembler.start(reader.header.tracks)
-        tracks = _Tracks(reader.header, reader.name)
+        tracks = UsableTracks(reader.header, reader.name)
         copier = _Copier(reader.header, writer, tracks, assembler.label, tell, keep=incomplete == "keep")
         for _, packet in reader.packets():
             if packet.track.kind is TrackKind.DEPTH:
@@ -92,43 +90,6 @@ def recover(
     return Recovered(writer.frame_count, copier.incomplete, copier.dropped)
 
 
-class _Tracks:
-    """Knows of each track whether its pictures still can be decoded.
-
-    Raises:
-        StreamError: the header's codec is unknown.
-    """
-
-    def __init__(self, header: StreamHeader, name: str) -> None:
-        if header.codec not in CODECS:
-            raise StreamError(name, f"codec {header.codec}", " or ".join(CODECS))
-        array = header.array
-        self._sizes = track_sizes(array.width, array.height, header.disparity_scale)
-        self._codec = CODECS[header.codec]
-        self._watches: dict[Track, ReferenceWatch] = {}
-
-    def lose(self, tracks: Iterable[Track]) -> None:
-        """Pictures of these tracks are missing."""
-        for track in tracks:
-            self._watches.pop(track, None)
-
-    def check(self, packet: Packet, label: str) -> StreamError | None:
-        """Why a packet cannot be decoded; None where it can."""
-        if packet.keyframe:
-            size = self._sizes[packet.track.kind]
-            codec = unit_codec(packet.track, self._codec)
-            self._watches[packet.track] = ReferenceWatch(codec, size)
-        watch = self._watches.get(packet.track)
-        if watch is None:
-            return StreamError(label, "a picture that builds on one that is missing", "a keyframe")
-        try:
-            watch.push(packet.data, label, packet.index)
-        except StreamError as error:
-            self.lose([packet.track])
-            return error
-        return None
-
-
 class _Copier:
     """Writes the frame sets that a decoder can decode. All headers of the new file say the same.
 
@@ -139,7 +100,7 @@ class _Copier:
         self,
         header: StreamHeader,
         writer: McapWriter,
-        tracks: _Tracks,
+        tracks: UsableTracks,
         label: Callable[[Packet], str],
         tell: Tell,
         *,
@@ -152,7 +113,7 @@ class _Copier:
         self._depth: dict[int, dict[Track, Packet]] = {}
         self._depth_tracks: set[Track] = set()
         self._layer: dict[int, dict[Track, Packet]] = {}
-        self._has_layer = False
+        self._usable_layer = UsableLayer(header, tracks, label, tell)
         self._absent: set[Track] = set()
         self._waits = True
         self.incomplete = self.dropped = 0
@@ -176,14 +137,6 @@ class _Copier:
             if len(self._layer) > _HELD_DEPTHS:
                 del self._layer[min(self._layer)]
 
-    def _with_layer(self, held: list[Packet]) -> list[Packet]:
-        """A frame set with what there is of its layer, from the layer's first header on."""
-        layer = self._layer.pop(held[0].index, {})
-        head = layer.pop(LAYER_TRACK, None)
-        if head is not None and held[0].track == HEADER_TRACK:
-            held, self._has_layer = [held[0], head, *held[1:]], True
-        return [*held, *layer.values()] if self._has_layer else held
-
     def flush(self) -> None:
         """Write the frame set that waits for its depth."""
         if not self._held:
@@ -192,15 +145,20 @@ class _Copier:
         depth = self._depth.pop(first.index, {})
         self._depth_tracks |= depth.keys()
         tracks = set(self._header.tracks) | self._depth_tracks
-        there = {packet.track for packet in self._held} | depth.keys()
+        base = {packet.track: packet for packet in self._held}
+        there = base.keys() | depth.keys()
         self._tell_absent(tracks - there, first)
-        self.incomplete += not tracks <= there
-        self._writer.push(
-            [*self._with_layer(self._held), *sorted(depth.values(), key=lambda packet: packet.track.topic)]
-        )
+        video = {track: packet for track, packet in base.items() if track != HEADER_TRACK}
+        layer = self._usable_layer.usable(video, self._layer.pop(first.index, {}))
+        self.incomplete += not (tracks <= there and self._usable_layer.complete(layer))
+        head = [packet for packet in layer if packet.track == LAYER_TRACK]
+        depths = sorted(depth.values(), key=lambda packet: packet.track.topic)
+        start, rest = self._held[: len(head)], self._held[len(head) :]
+        self._writer.push([*start, *head, *rest, *layer[len(head) :], *depths])
         self._held = []
 
     def _push(self, found: PacketSet) -> None:
+        self.flush()
         first = found.first
         if self._last is not None and first.time_ns <= self._last.time_ns:
             self._tracks.lose(self._header.tracks)
@@ -215,9 +173,9 @@ class _Copier:
         if found.header is not None and self._can_be_shown(usable):
             self._waits = False
         if self._waits or not usable:
+            self._usable_layer.lose()
             self.dropped += 1
             return
-        self.flush()
         packets = [usable[track] for track in self._header.tracks if track in usable]
         if found.header is not None:
             if self._last is None and first.index != self._header.first_frame:
@@ -226,6 +184,7 @@ class _Copier:
         self._held, self._last = packets, first
 
     def _drop(self) -> None:
+        self._usable_layer.lose()
         self._waits = True
         self.dropped += 1
 

@@ -10,6 +10,7 @@ from typing import BinaryIO, Protocol
 
 from mvcodec.conformance.file_check import CheckedMessage, FileCheck
 from mvcodec.conformance.finding import Finding, error, warning
+from mvcodec.conformance.layer_check import LayerCheck
 from mvcodec.conformance.message_check import MessageCheck
 from mvcodec.conformance.topic_check import POINTS, VIDEO
 from mvcodec.conformance.topic_validation import TopicValidation
@@ -17,6 +18,7 @@ from mvcodec.conformance.unit_rules import UnitRules
 from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.declared import METADATA_NAME
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.enhancement import LAYER_TRACK
 from mvcodec.errors import InputError, StreamError
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, unknown_fields
 from mvcodec.video.codecs import CODECS
@@ -122,6 +124,7 @@ class _StreamCheck:
         self._header: StreamHeader | None = None
         self._header_data = b""
         self._messages: MessageCheck | None = None
+        self._layer: LayerCheck | None = None
         self._rules: dict[Track, UnitRules] = {}
         self._tracks: dict[str, Track] = {}
         self._assembler = Assembler(name, self._tell_order)
@@ -143,12 +146,17 @@ class _StreamCheck:
                 )
             return
         assert self._messages is not None or message.topic == HEADER_TRACK.topic
-        if self._messages is not None and message.topic in self._messages.topics:
+        if self._layer is not None and message.topic == LAYER_TRACK.topic:
+            self._check_set(message)
+            self._layer.push_header(message)
+        elif self._messages is not None and message.topic in self._messages.topics:
             self._check_set(message)
             data = self._messages.push(message)
             track = self._tracks.get(message.topic)
             if track is not None and data is not None:
                 self._push_unit(track, message, data)
+            elif self._layer is not None and self._layer.takes(message.topic) and data is not None:
+                self._layer.push_unit(message, data, record.sequence == self._key_index)
 
     def end(self, check: FileCheck) -> None:
         """Check what can be known at the end only."""
@@ -158,6 +166,8 @@ class _StreamCheck:
         self._tell_sets(self._assembler.flush())
         self._end_set()
         assert self._messages is not None
+        if self._layer is not None:
+            self._layer.end()
         self.findings += self._messages.end()
         said = check.metadata.get(METADATA_NAME, {}).get("header")
         if said is None:
@@ -189,6 +199,8 @@ class _StreamCheck:
             self._add(error("header", "it differs from the first one", topic, time_ns))
         if self._messages is not None:
             self._messages.begin_keyframe(record)
+        if self._layer is not None:
+            self._layer.begin_keyframe(record)
         self._key_ns, self._key_index = time_ns, record.sequence
 
     def _start(self, header: StreamHeader, data: bytes) -> None:
@@ -203,6 +215,7 @@ class _StreamCheck:
                 track: UnitRules(unit_codec(track, codec), track.kind, sizes[track.kind])
                 for track in header.tracks
             }
+            self._layer = LayerCheck(header, codec, self._messages, self._add)
         self._tracks = {track.topic: track for track in header.tracks}
         self._assembler.start(header.tracks)
 
@@ -228,6 +241,8 @@ class _StreamCheck:
     def _end_set(self) -> None:
         if self._now is not None and self._messages is not None:
             self._messages.end_set(self._now[1])
+            if self._layer is not None:
+                self._layer.end_set(self._now[1])
 
     def _push_unit(self, track: Track, message: CheckedMessage, data: bytes) -> None:
         record = message.record

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
 from mvcodec.container.chunks import OnDamage
 from mvcodec.container.reader import McapReader
+from mvcodec.enhancement import LAYER_TRACK, EnhancementHeader
 from mvcodec.errors import StreamError
 from mvcodec.stream import StreamHeader, TrackKind
 
@@ -20,6 +22,7 @@ class Bits:
         total: the whole file.
         texture: access units of the pictures.
         disparity: access units of the maps.
+        enhancement: access units of the enhancement layer's views.
         other: the rest: container, headers, calibration, depth. 0 where the container's compression
             saves more than that takes.
     """
@@ -27,12 +30,16 @@ class Bits:
     total: int
     texture: int
     disparity: int
+    enhancement: int
     other: int
 
     @classmethod
-    def of(cls, total: int, texture: int, disparity: int) -> Bits:
-        """The sizes, the rest worked out."""
-        return cls(total, texture, disparity, max(0, total - texture - disparity))
+    def of(cls, total: int, payload: Mapping[TrackKind, int]) -> Bits:
+        """The sizes out of those of the tracks' access units, by kind; the rest worked out."""
+        texture = payload[TrackKind.TEXTURE] + payload[TrackKind.PREDICTED]
+        disparity, enhancement = payload[TrackKind.DISPARITY], payload[TrackKind.ENHANCED]
+        other = max(0, total - texture - disparity - enhancement)
+        return cls(total, texture, disparity, enhancement, other)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +51,7 @@ class StreamInfo:
         dropped: frame sets that a live encoder left out; None where the file says nothing of it.
         damages: in how many places the file is damaged; what is there was not counted.
         span_ns: times of the first and the last frame set; (0, 0) where there is none.
+        layer: the header of the enhancement layer; None where there is none.
     """
 
     header: StreamHeader
@@ -52,6 +60,7 @@ class StreamInfo:
     dropped: int | None = None
     damages: int = 0
     span_ns: tuple[int, int] = (0, 0)
+    layer: EnhancementHeader | None = None
 
     @property
     def duration_s(self) -> float:
@@ -79,16 +88,18 @@ def read_info(source: str | Path | BinaryIO, on_damage: OnDamage | None = None) 
     sizes = dict.fromkeys(TrackKind, 0)
     frames, last = 0, -1
     times: list[int] = []
-    with McapReader.open(source, on_damage=None if on_damage is None else note) as reader:
+    layer: EnhancementHeader | None = None
+    with McapReader.open(source, on_damage=None if on_damage is None else note, layer=True) as reader:
         for number, packet in reader.packets():
+            if packet.track == LAYER_TRACK and layer is None:
+                label = f"{reader.name}: {packet.track.topic}"
+                layer = EnhancementHeader.from_json(packet.data, reader.header, label)
             sizes[packet.track.kind] += 8 * len(packet.data)
             if number != last:
                 frames, last = frames + 1, number
                 times = [*times[:1], packet.time_ns]
         dropped = reader.dropped
         total = 8 * reader.size
-    texture = sizes[TrackKind.TEXTURE] + sizes[TrackKind.PREDICTED]
-    disparity = sizes[TrackKind.DISPARITY]
-    bits = Bits.of(total, texture, disparity)
+    bits = Bits.of(total, sizes)
     span = (times[0], times[-1]) if times else (0, 0)
-    return StreamInfo(reader.header, frames, bits, dropped, len(damages), span)
+    return StreamInfo(reader.header, frames, bits, dropped, len(damages), span, layer)

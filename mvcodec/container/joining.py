@@ -51,7 +51,7 @@ def join(parts: Sequence[str | Path], target: BinaryIO | Path, limits: Limits = 
     header = known[0].header
     with McapWriter(target) as writer:
         for part in parts:
-            with McapReader.open(part, limits, depth=True) as reader:
+            with McapReader.open(part, limits, depth=True, layer=True) as reader:
                 for packets in _frame_sets(reader, header):
                     writer.push(packets)
         left_out = [part.dropped for part in known if part.dropped is not None]

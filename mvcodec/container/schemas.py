@@ -112,6 +112,13 @@ def frame_id(camera: Position) -> str:
     return f"camera_{view_name(camera)}"
 
 
+def track_frame(track: Track) -> str:
+    """The `frame_id` of a video track's messages, e.g. ``view_r01_c01`` for an enhanced view."""
+    assert track.camera is not None
+    enhanced = track.kind is TrackKind.ENHANCED
+    return f"view_{view_name(track.camera)}" if enhanced else frame_id(track.camera)
+
+
 def rig_messages(array: CameraArray) -> tuple[RigMessage, ...]:
     """Calibration and place of every real camera."""
     places = {camera: Viewpoint(*camera) for camera in array.real}
@@ -159,11 +166,8 @@ def video_format(track: Track, codec: str) -> str:
 
 def video_message(packet: Packet, codec: str) -> bytes:
     """A serialised foxglove.CompressedVideo (or mvcodec.PredictedVideo) of a packet."""
-    assert packet.track.camera is not None
     form = video_format(packet.track, codec)
-    enhanced = packet.track.kind is TrackKind.ENHANCED
-    frame = f"view_{view_name(packet.track.camera)}" if enhanced else frame_id(packet.track.camera)
-    return compressed_video(frame, packet.time_ns, packet.data, form)
+    return compressed_video(track_frame(packet.track), packet.time_ns, packet.data, form)
 
 
 def compressed_video(frame: str, time_ns: int, data: bytes, form: str) -> bytes:

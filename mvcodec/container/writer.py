@@ -43,6 +43,7 @@ class McapWriter(Closing):
         self._file = ChunkedFile(file, chunk_ms, listener)
         self._rig: tuple[schemas.RigMessage, ...] = ()
         self._video_topics: tuple[str, ...] = ()
+        self._layer_topics: set[str] = set()
         self._codec = ""
         self._size = 0, 0
         self._closed = False
@@ -96,6 +97,9 @@ class McapWriter(Closing):
         self._size = header.array.width, header.array.height
         self._file.open()
         self._add_channels(header)
+        for packet in packets:
+            if packet.track.kind is TrackKind.LAYER:
+                self._add_layer_channels(packet)
         self._file.add_metadata(METADATA_NAME, {"header": first.data.decode(), TOPICS_KEY: self._topics()})
 
     def _message(self, packet: Packet) -> bytes:
@@ -108,14 +112,16 @@ class McapWriter(Closing):
         return schemas.video_message(packet, self._codec)
 
     def _add_layer_channels(self, packet: Packet) -> None:
-        """The channels of an enhancement layer, with its first header."""
-        if packet.track.topic in self._file.channels:
-            return
-        json_schema = (schemas.LAYER_SCHEMA_NAME, SchemaEncoding.JSONSchema, schemas.LAYER_SCHEMA)
-        self._file.add_channel(packet.track.topic, MessageEncoding.JSON, *json_schema)
+        """The channels of an enhancement layer, those that no header named before."""
+        if packet.track.topic not in self._file.channels:
+            json_schema = (schemas.LAYER_SCHEMA_NAME, SchemaEncoding.JSONSchema, schemas.LAYER_SCHEMA)
+            self._file.add_channel(packet.track.topic, MessageEncoding.JSON, *json_schema)
         layer = EnhancementHeader.from_json(packet.data, self._base, packet.track.topic)
-        for channel in schemas.channels((), {each.track.topic: "predicted" for each in layer.views}):
-            self._file.add_channel(*channel)
+        topics = {each.track.topic: schemas.video_kind(each.track) for each in layer.views}
+        for channel in schemas.channels((), topics):
+            if channel[0] not in self._file.channels:
+                self._file.add_channel(*channel)
+        self._layer_topics |= {packet.track.topic, *topics}
 
     def _add_channels(self, header: StreamHeader) -> None:
         self._video_topics = tuple(track.topic for track in header.tracks)
@@ -127,6 +133,6 @@ class McapWriter(Closing):
 
     def _topics(self) -> str:
         """Which topic each channel is, for readers that lack the first chunk, where channels are declared."""
-        tracks = {HEADER_TRACK.topic, *self._video_topics}
-        topics = {number: topic for topic, number in self._file.channels.items() if topic in tracks}
+        needed = {HEADER_TRACK.topic, *self._video_topics, *self._layer_topics}
+        topics = {number: topic for topic, number in self._file.channels.items() if topic in needed}
         return json.dumps(topics, separators=(",", ":"))

@@ -130,7 +130,8 @@ class Encoder:
         position, self._position = self._position, 0
         if self._last is not None and frames.time_ns - self._key_ns >= KEYFRAME_NS:
             position = 0  # frame sets came more slowly than their nominal rate
-        if self._last is not None and frames.index != self._last.index + 1 and not self._codec.numbered:
+        numbered = self._codec.numbered and not (self._order or self._layer_views)
+        if self._last is not None and frames.index != self._last.index + 1 and not numbered:
             position = 0  # else what was left out would look like what was lost
         jobs: dict[Track, Job[list[CodedPicture]]] = {}
         try:

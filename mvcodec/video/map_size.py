@@ -43,6 +43,7 @@ def track_sizes(width: int, height: int, scale: int) -> dict[TrackKind, tuple[in
     return {
         TrackKind.TEXTURE: even_size(width, height),
         TrackKind.PREDICTED: frame_size(even_size(width, height)),
+        TrackKind.ENHANCED: frame_size(even_size(width, height)),
         TrackKind.DISPARITY: coded_size(width, height, scale),
     }
 

@@ -296,4 +296,4 @@ PREDICTED = replace(
 
 def unit_codec(track: Track, codec: Codec) -> Codec:
     """What reads the units of a track; `codec` is the header's."""
-    return PREDICTED if track.kind is TrackKind.PREDICTED else codec
+    return PREDICTED if track.kind in (TrackKind.PREDICTED, TrackKind.ENHANCED) else codec
