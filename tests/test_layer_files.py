@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import succeeds
-from mvcodec.container.join import join
 from test_enhancement import ARRAY, VIRTUAL, coded, decoded, frames, pushed, written
 
 from mvcodec.conformance.recovery import recover
 from mvcodec.conformance.validation import validate
 from mvcodec.container import McapReader, McapWriter, read_info
+from mvcodec.container.joining import join
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.enhancement import LAYER_TRACK
