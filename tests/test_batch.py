@@ -79,7 +79,7 @@ def test_ctrl_c_leaves_finished_segments_and_the_next_run_uses_them(
     output = tmp_path / "out"
     command = ("batch", "encode", array, "--output", output, "--cluster", cluster, "--segment", "1s", *QUICK)
     started = subprocess.Popen([*COMMAND, *map(str, command)], stderr=subprocess.PIPE)
-    wait_for(lambda: any(output.glob("batch/*/*.mcap")), "a finished segment")
+    wait_for(lambda: any(output.glob("batch/*/00000000-*.mcap")), "the first segment")
     started.send_signal(signal.SIGINT)
     _, said = started.communicate()
     assert started.returncode == 1

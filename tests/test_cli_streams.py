@@ -34,7 +34,7 @@ def shell(line: str) -> tuple[int, list[str]]:
     """Run ``mvcodec LINE`` by a shell; the exit code and the lines on standard error, warnings left out."""
     command = shlex.join(COMMAND)
     done = subprocess.run(
-        ["sh", "-c", f"{command} {line}"], stderr=subprocess.PIPE, text=True, check=False, timeout=120
+        ["sh", "-c", f"{command} {line}"], stderr=subprocess.PIPE, text=True, check=False, timeout=900
     )
     return done.returncode, [text for text in done.stderr.splitlines() if "mvcodec: warning: " not in text]
 

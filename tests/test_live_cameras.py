@@ -24,7 +24,7 @@ from mvcodec.capture.live_clock import ArrivalClock, common_clock
 from mvcodec.container import read_info
 from mvcodec.errors import InputError, SettingError
 
-pytestmark = pytest.mark.slow  # cameras send in real time
+in_real_time = pytest.mark.slow
 
 Taken = tuple[list[list[int]], list[int], list[str]]
 
@@ -55,6 +55,7 @@ def together(numbers: list[list[int]]) -> bool:
     return all(len(set(found)) == 1 for found in numbers)
 
 
+@in_real_time
 def test_a_delay_on_the_way_does_not_matter() -> None:
     numbers, times, told = taken(30, {}, {"delay_s": 0.25})
     assert together(numbers)
@@ -64,12 +65,14 @@ def test_a_delay_on_the_way_does_not_matter() -> None:
     assert any("paired by their stamps" in text for text in told)
 
 
+@in_real_time
 def test_clocks_that_begin_anywhere_are_paired_by_arrival() -> None:
     numbers, _, told = taken(30, {}, {"first_s": 500.0})
     assert together(numbers)
     assert any("paired by arrival" in text for text in told)
 
 
+@in_real_time
 def test_only_whole_pictures_come_through_losses() -> None:
     def lost(number: int, place: int) -> bool:
         return number % 11 == 5 and place == 0
@@ -80,12 +83,14 @@ def test_only_whole_pictures_come_through_losses() -> None:
     assert len(found) >= 20, "keyframes heal what was lost"
 
 
+@in_real_time
 def test_a_camera_that_was_away_comes_back() -> None:
     numbers, times, _ = taken(110, {}, {"away": range(70, 100)})
     assert together(numbers)
     assert max(np.diff(times)) > 0.9e9, "the gap is one in the times too"
 
 
+@in_real_time
 def test_a_camera_that_breaks_off_is_opened_again() -> None:
     with ExitStack() as stack, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -108,6 +113,7 @@ def test_a_silent_camera_is_named_after_a_while() -> None:
         taken(1, {}, {"away": range(10**6)}, patience_s=1.5)
 
 
+@in_real_time
 def test_the_command_ends_with_ctrl_c_and_its_file_is_whole(tmp_path: Path) -> None:
     ports, out = [free_port(), free_port()], tmp_path / "out.mcap"
     addresses = [f"udp://127.0.0.1:{port}" for port in ports]
@@ -136,6 +142,25 @@ def wait_for(happened: Callable[[], bool], at_most_s: float = 90.0) -> None:
     while not happened():
         assert time.monotonic() < end_s, "it never happened"
         time.sleep(0.05)
+
+
+def test_the_command_waits_for_what_reads_before_it_ends(tmp_path: Path) -> None:
+    """A thread inside FFmpeg asks Python whether to go on; it crashed where Python had ended."""
+    addresses = [f"udp://127.0.0.1:{free_port()}" for _ in range(4)]
+    for _ in range(2):
+        line = fails(
+            1,
+            "encode",
+            *addresses,
+            tmp_path / "out.mcap",
+            "--grid",
+            "2x2",
+            "--real",
+            "all",
+            "--patience",
+            "0.1",
+        )
+        assert "found no whole picture for 0.1 s" in line
 
 
 def test_addresses_are_told_from_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import threading
 import time
 import warnings
@@ -27,6 +28,7 @@ MAX_WAITING = 96
 """Pictures of a camera that wait for those of the others; older ones are left out."""
 
 _OPEN_S, _READ_S, _RETRY_S = 10.0, 4.0, 0.25
+"""The longest that FFmpeg may wait for a camera's first pictures, and for the next; pause between tries."""
 
 _CHECKED = ("h264", "hevc", "vp9", "av1")
 """Codecs whose missing references are noticed. Others must code each picture alone."""
@@ -54,6 +56,7 @@ class LiveCamera:
     Args:
         address: what FFmpeg opens.
         changed: notified of each picture.
+        patience_s: no single call waits for longer than that.
 
     Attributes:
         address: of the camera.
@@ -64,25 +67,37 @@ class LiveCamera:
         problem: why it cannot be read now; empty where it can.
     """
 
-    def __init__(self, address: str, changed: threading.Condition) -> None:
+    def __init__(self, address: str, changed: threading.Condition, patience_s: float = _OPEN_S) -> None:
         self.address = address
         self.waiting: deque[LivePicture] = deque()
         self.clock = ArrivalClock()
         self.connection = self.left_out = 0
         self.problem = ""
         self._changed, self._stop = changed, threading.Event()
-        # A read may take seconds to end; the process must not wait for it.
+        self._timeout_s = min(_OPEN_S, patience_s), min(_READ_S, patience_s)
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def start(self) -> None:
         """Begin to read."""
+        # FFmpeg asks Python whether to go on waiting: a thread inside it must end before Python does.
+        atexit.register(self._finish)
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the picture at hand."""
+        """End after the picture at hand; what waits inside FFmpeg ends by itself, soon."""
         self._stop.set()
 
+    def _finish(self) -> None:
+        self.stop()
+        self._thread.join()
+
     def _run(self) -> None:
+        try:
+            self._read_on()
+        finally:
+            atexit.unregister(self._finish)
+
+    def _read_on(self) -> None:
         while not self._stop.is_set():
             try:
                 self._read()
@@ -98,7 +113,7 @@ class LiveCamera:
 
     def _read(self) -> None:
         how = how_to_open(self.address)
-        with av.open(how.file, format=how.form, options=how.options, timeout=(_OPEN_S, _READ_S)) as container:
+        with av.open(how.file, format=how.form, options=how.options, timeout=self._timeout_s) as container:
             stream = next(iter(container.streams.video), None)
             if stream is None:
                 raise InputError(self.address, "no video", "a camera")

@@ -97,7 +97,7 @@ class LiveCameras:
         self._axes = select_real(settings.real, rows, cols)
         self._changed = threading.Condition()
         self._cameras = {
-            (row, col): LiveCamera(addresses[row * cols + col], self._changed)
+            (row, col): LiveCamera(addresses[row * cols + col], self._changed, settings.patience_s)
             for row in self._axes[0]
             for col in self._axes[1]
         }

@@ -205,13 +205,15 @@ class _Run:
         others = [
             option for option in self._batch.options if option[0] not in ("--frames", "--disparity-range")
         ]
-        for segment in cut(frames, plan["gop"], plan["fps"], self._batch.segment_s):
+        segments = cut(frames, plan["gop"], plan["fps"], self._batch.segment_s)
+        # All are waited for before the first is looked at: one that is there already must not end the job.
+        job.waiting = len(segments)
+        for segment in segments:
             own = [f"--frames={segment.start}:{segment.stop}", f"--disparity-range={low!r},{high!r}"]
             if segment.start > frames.start:
                 own.append(f"--continues={segment.start - frames.start}")
             part = self._segments(job) / f"{segment.start:08d}-{segment.stop:08d}.mcap"
             job.parts.append(part.url)
-            job.waiting += 1
             if part.exists():
                 self._segment_done(job, len(segment), Outcome())
                 continue
@@ -231,9 +233,10 @@ class _Run:
         info = planned.result
         frames = range(info["frames"])
         self._progress.more(len(frames))
-        for segment in cut(frames, 1, info["fps"], self._batch.segment_s):
+        segments = cut(frames, 1, info["fps"], self._batch.segment_s)
+        job.waiting = len(segments)
+        for segment in segments:
             part = self._segments(job) / f"{segment.start:08d}-{segment.stop:08d}"
-            job.waiting += 1
             if part.exists():
                 self._views_done(job, len(segment), Outcome())
                 continue
