@@ -3,10 +3,11 @@
     python tools/form_rates.py INPUT [--forms NAME,..] [--qp N,N..] [--matcher NAME] [--real ...]
                                [--frames A:B] [--json]
 
-Forms: `plain` (what encode writes by default), `none` (no maps in the file), `synthesis` (real cameras coded
-from each other), `synthesis-alternate` (and maps from every second one, whatever the array). All views of the
+Forms: `plain` (what encode writes by default), `none` (no maps in the file), `synthesis` (real cameras
+coded from each other), `synthesis-alternate` (and maps from every second one, whatever the array); each of
+them with `+N` behind it has an enhancement layer whose QP is N more than the pictures'. All views of the
 input's grid are rendered and compared, the container counts. The last lines are BD-rates against the first
-form.
+form, of each other form and of the hull of all but the first.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, join_negative
 from mvcodec.cli.coding_options import find_range
 from mvcodec.encoding.encoder import EncoderConfig, find_matcher
 from mvcodec.errors import MvCodecError
-from mvcodec.evaluation.bd import compare_curves
+from mvcodec.evaluation.bd import compare_curves, hull
 from mvcodec.evaluation.chain import measure_chain
 from mvcodec.evaluation.points import CurvePoint
 from mvcodec.evaluation.remembered import MapSpool, Remembered
@@ -39,6 +40,7 @@ FORMS: Mapping[str, Mapping[str, str]] = {
     "synthesis-alternate": {"prediction": "synthesis", "disparity_cameras": "alternate"},
 }
 QPS = "22,27,32,37,42"
+MAX_QP = 51
 
 
 def main() -> int:
@@ -46,7 +48,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
     parser.add_argument("input", type=Path, metavar="INPUT", help="an array folder")
     parser.add_argument("--real", default="corners", help="as for encode (default: %(default)s)")
-    parser.add_argument("--forms", default=",".join(FORMS), help="some of %(default)s")
+    parser.add_argument("--forms", default=",".join(FORMS), help="some of %(default)s, each also with +N")
     parser.add_argument("--qp", default=QPS, type=whole_numbers, metavar="N,N..", help="default: %(default)s")
     parser.add_argument("--matcher", default="joint", metavar="NAME")
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
@@ -74,11 +76,17 @@ def measure(arguments: argparse.Namespace) -> dict[str, list[CurvePoint]]:
     with tempfile.TemporaryDirectory() as folder, MapSpool(Path(folder)) as spool:
         return {
             form: [
-                _point(source, chosen, replace(base, qp=qp, **FORMS[form]), spool, Path(folder))  # type: ignore[arg-type]
-                for qp in arguments.qp
+                _point(source, chosen, _config(base, form, qp), spool, Path(folder)) for qp in arguments.qp
             ]
             for form in arguments.forms.split(",")
         }
+
+
+def _config(base: EncoderConfig, form: str, qp: int) -> EncoderConfig:
+    """The settings of a form at a QP."""
+    name, plus, offset = form.partition("+")
+    enhance = min(qp + int(offset), MAX_QP) if plus else None
+    return replace(base, qp=qp, enhance=enhance, **FORMS[name])  # type: ignore[arg-type]
 
 
 def _point(
@@ -111,7 +119,9 @@ def report(curves: Mapping[str, list[CurvePoint]]) -> None:
             )
     first, *others = curves
     pairs = {form: [_rate_and_quality(point) for point in curve] for form, curve in curves.items()}
-    for form in others:
+    if len(others) > 1:
+        pairs["hull"] = hull([pair for form in others for pair in pairs[form]])
+    for form in [*others, "hull"][: len(pairs) - 1]:
         delta = compare_curves(pairs[first], pairs[form])
         percent = "-" if delta.rate_percent is None else f"{delta.rate_percent:+.1f} %"
         print(f"BD-rate of {form} over {first}: {percent}")

@@ -23,6 +23,7 @@ OPTIONS = {
     "qp": "--qp",
     "crf": "--crf",
     "bitrate_kbps": "--bitrate",
+    "target_psnr": "--target-psnr",
     "disparity_qp": "--disparity-qp",
     "disparity_scale": "--disparity-scale",
     "disparity_cameras": "--disparity-cameras",

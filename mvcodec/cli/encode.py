@@ -13,7 +13,7 @@ from pathlib import Path
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.capture.manifest import read_calibration
-from mvcodec.cli.arguments import add_frames, add_output_options, bit_rate
+from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, add_output_options, bit_rate
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.encode_stream import (
     Unfinished,
@@ -45,6 +45,7 @@ from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.speed_choice import FOR_LIVE
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.output.live_view import LiveView
+from mvcodec.synthesis.synthesizers import make_synthesizer
 
 SUFFIX = ".mcap"
 GIVEN = "given"
@@ -70,7 +71,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--bitrate",
         type=bit_rate,
         metavar="KBPS",
-        help="kbit/s of the pictures and maps of all cameras; 2M is 2000",
+        help="kbit/s of the pictures and maps of all cameras, with --enhance auto of the layer too;"
+        " 2M is 2000",
+    )
+    rate.add_argument(
+        "--target-psnr",
+        type=float,
+        metavar="DB",
+        help="the largest QP whose mean luma PSNR over all views of the grid is DB or more, measured on 2"
+        " frame sets from the middle of INPUT, which must have the originals of all views",
     )
     add_coding(parser)
     add_layer(parser)
@@ -132,6 +141,8 @@ def _check_effect(arguments: argparse.Namespace) -> None:
         raise SettingError("--nominal", "no --depth", "--depth raw16, for which it accepts the calibration")
     if not is_stream(arguments):
         refuse_stream_options(arguments)
+    elif arguments.target_psnr is not None:
+        raise SettingError("--target-psnr", "with a recording or a stream", "an array folder or videos")
     elif arguments.enhance is not None:
         raise SettingError("--enhance", "with a recording or a stream", "an array folder or videos")
     elif arguments.dry_run or arguments.continues:
@@ -165,8 +176,25 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
     if arguments.dry_run:
         print(plan(array, config, chosen, range_px))
         return None
+    config = replace(config, disparity_range_px=range_px)
+    if arguments.target_psnr is not None:
+        config = _config_for_quality(source, chosen, config, arguments)
     with live_view(arguments) as view:
-        return _encode(source, array, chosen, replace(config, disparity_range_px=range_px), arguments, view)
+        return _encode(source, array, chosen, config, arguments, view)
+
+
+def _config_for_quality(
+    source: ArraySource, chosen: range, config: EncoderConfig, arguments: argparse.Namespace
+) -> EncoderConfig:
+    """The settings with the QP that --target-psnr asks for."""
+    from mvcodec.evaluation.target_quality import qp_for_quality
+
+    synthesizer = make_synthesizer(DEFAULT_SYNTHESIZER)
+    with progress("look for the QP", None, quiet=arguments.quiet, unit="coding") as bar:
+        found = qp_for_quality(source, chosen, config, arguments.target_psnr, synthesizer, bar.update)
+    if not arguments.quiet and not arguments.json:
+        print(f"QP {found.qp}: {found.psnr_y:.2f} dB, found by coding 2 frame sets {found.codings} times")
+    return replace(config, qp=found.qp)
 
 
 def _open(arguments: argparse.Namespace) -> ArraySource:

@@ -6,6 +6,7 @@ import math
 from dataclasses import InitVar, dataclass, fields
 
 from mvcodec.array import CameraArray, Position
+from mvcodec.encoding.layer_rate import LAYER_OFFSET, LAYER_SHARE
 from mvcodec.encoding.speed_choice import FOR_FILES, SPEEDS
 from mvcodec.errors import SettingError
 from mvcodec.settings import check_settings, setting
@@ -83,9 +84,10 @@ class EncoderConfig:
         "synthesis: real cameras are coded from each other, for fewer bits; the first one plays alone",
         choices=PREDICTIONS,
     )
-    enhance: int | None = setting(
+    enhance: int | str | None = setting(
         None,
-        "QP of an enhancement layer: views whose originals are there, coded from their synthesis",
+        "QP of an enhancement layer: views whose originals are there, coded from their synthesis;"
+        " auto: chosen for the pictures' quantiser, or so that base and layer together hold the bit rate",
     )
     enhance_views: tuple[Position, ...] | None = None
     disparity_median: int | None = setting(
@@ -106,7 +108,9 @@ class EncoderConfig:
         if any(value is not None for value in (qp, crf, bitrate_kbps)):
             object.__setattr__(self, "rate", RateControl(qp, crf, bitrate_kbps))
         check_qp("disparity_qp", self.disparity_qp, max_qp)
-        check_qp("enhance", self.enhance, max_qp)
+        if isinstance(self.enhance, str) and self.enhance != AUTO:
+            raise SettingError("enhance", self.enhance, f"a QP, or {AUTO}")
+        check_qp("enhance", None if isinstance(self.enhance, str) else self.enhance, max_qp)
         self.rate.check_scale(max_qp)
         check_settings(self)
         if self.enhance is not None and self.disparity_cameras == "none":
@@ -141,6 +145,20 @@ class EncoderConfig:
         """The pictures' QP or CRF; None where a bit rate governs."""
         return self.rate.quality
 
+    @property
+    def layer_quality(self) -> float | None:
+        """The enhancement layer's QP on the codec's scale; None where none is, or a bit rate governs it."""
+        if self.enhance != AUTO or self.quality is None:
+            return None if isinstance(self.enhance, str) else self.enhance
+        codec = find_codec(self.codec)
+        return min(self.quality + LAYER_OFFSET * codec.qp_line[0], codec.max_qp)
+
+    @property
+    def _base_kbps(self) -> float | None:
+        """The bit rate of all tracks of the base."""
+        kbps = self.rate.bitrate_kbps
+        return kbps if kbps is None or self.enhance != AUTO else kbps * (1 - LAYER_SHARE)
+
     def scale_for(self, array: CameraArray) -> int:
         """The scale of the maps of an array."""
         if self.disparity_scale is not None:
@@ -163,7 +181,7 @@ class EncoderConfig:
 
     def rate_of_pictures(self, array: CameraArray) -> RateControl:
         """The rate control of one camera's pictures."""
-        kbps = self.rate.bitrate_kbps
+        kbps = self._base_kbps
         if kbps is None:
             return self.rate
         senders = map_cameras(array, self.cameras_for(array))
@@ -174,8 +192,8 @@ class EncoderConfig:
         """The rate control of one camera's maps; `range_px` is the header's."""
         if self.disparity_qp is not None:
             return RateControl(qp=self.disparity_qp)
-        if self.rate.bitrate_kbps is not None:
-            return _share(self.rate.bitrate_kbps, DISPARITY_SHARE, array)
+        if self._base_kbps is not None:
+            return _share(self._base_kbps, DISPARITY_SHARE, array)
         assert self.quality is not None
         scale, cameras = self.scale_for(array), self.cameras_for(array)
         return RateControl(qp=default_disparity_qp(self.quality, scale, cameras, range_px, self.codec))

@@ -14,6 +14,7 @@ from mvcodec.array import CameraArray, Position
 from mvcodec.depth import depth_mm, warn_behind_infinity
 from mvcodec.encoding.config import EncoderConfig, default_gop, find_matcher, matcher_name
 from mvcodec.encoding.enhancer import Enhancer, enhanced_views
+from mvcodec.encoding.layer_rate import LayerRate
 from mvcodec.encoding.predicted_cameras import PredictedCameras, predicted_quantizer, prediction_order
 from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet, Picture
@@ -241,7 +242,12 @@ class Encoder:
     def _make_enhancer(self, header: StreamHeader) -> Enhancer | None:
         if self.config.enhance is None:
             return None
-        quantizer = predicted_quantizer(self.config.enhance, self._codec)
+        quantizer: int | LayerRate
+        if self.config.layer_quality is None:
+            assert self.config.rate.bitrate_kbps is not None
+            quantizer = LayerRate(self.config.rate.bitrate_kbps, self.array.fps)
+        else:
+            quantizer = predicted_quantizer(self.config.layer_quality, self._codec)
         return Enhancer(header, self._layer_views, quantizer, self.config.chosen_preset)
 
     def _make_header(self, frames: FrameSet) -> StreamHeader:

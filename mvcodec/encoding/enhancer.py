@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from mvcodec.array import CameraArray, Position, Viewpoint
+from mvcodec.encoding.layer_rate import MOST_TRIES, LayerRate
 from mvcodec.encoding.predicted_cameras import SPEEDS
 from mvcodec.enhancement import LAYER_TRACK, EnhancedView, EnhancementHeader
 from mvcodec.errors import SettingError
@@ -51,20 +53,25 @@ class Enhancer:
     Args:
         header: the base's.
         views: virtual ones.
-        quantizer: 0..63.
+        quantizer: 0..63, or what chooses it at each keyframe.
         preset: effort, one of PRESETS.
 
     Raises:
         LibvpxMissing: there is no libvpx.
     """
 
-    def __init__(self, header: StreamHeader, views: Sequence[Position], quantizer: int, preset: str) -> None:
+    def __init__(
+        self, header: StreamHeader, views: Sequence[Position], quantizer: int | LayerRate, preset: str
+    ) -> None:
         size = even_size(header.array.width, header.array.height)
-        self._coding = ReferenceSettings(*size, quantizer, speed=SPEEDS[preset])
+        self._rate = quantizer if isinstance(quantizer, LayerRate) else None
+        first = quantizer.quantizer if isinstance(quantizer, LayerRate) else quantizer
+        self._coding = ReferenceSettings(*size, first, speed=SPEEDS[preset])
         self._order = layer_order(header.array, views)
-        self.header = EnhancementHeader(self._order, {"quantizer": quantizer, "speed": SPEEDS[preset]})
+        said = {} if self._rate else {"quantizer": first}
+        self.header = EnhancementHeader(self._order, {**said, "speed": SPEEDS[preset]})
         self._base_header, self._base = header, StreamTracks(header)
-        self._encoders = {each.view: Vp9ReferenceEncoder(self._coding) for each in self._order}
+        self._encoders = self._fresh_encoders()
         sources = {other for each in self._order for other in each.references}
         self._mirrors = {each.view: Vp9ReferenceDecoder(size) for each in self._order if each.view in sources}
 
@@ -82,9 +89,28 @@ class Enhancer:
         keyframe = base[0].keyframe
         frame = FramePrediction(self._base_header, self._base.decode(base))
         index, time_ns = base[0].index, base[0].time_ns
+        if keyframe and self._rate is not None:
+            self._rate.begin()
+        units = self._code_views(frame, pictures, keyframe)
+        if self._rate is not None:
+            tries = 1
+            while tries < MOST_TRIES and self._rate.try_again(_bits(units.values())):
+                units, tries = self._code_views(frame, pictures, keyframe), tries + 1
+            self._rate.spend(_bits(packet.data for packet in base), _bits(units.values()))
         packets = list(base)
         if keyframe:
             packets.insert(1, Packet(LAYER_TRACK, index, time_ns, True, self.header.to_json()))
+        layer = (Packet(each.track, index, time_ns, keyframe, units[each.view]) for each in self._order)
+        return [*packets, *layer]
+
+    def _code_views(
+        self, frame: FramePrediction, pictures: Mapping[Position, Picture], keyframe: bool
+    ) -> dict[Position, bytes]:
+        """The units of one frame set. At a keyframe all encoders may begin with another quantizer."""
+        if keyframe and self._rate is not None and self._rate.quantizer != self._coding.quantizer:
+            self._coding = replace(self._coding, quantizer=self._rate.quantizer)
+            self._encoders = self._fresh_encoders()
+        found: dict[Position, bytes] = {}
         waiting = list(self._order)
         while waiting:
             # Views whose references are there are coded side by side.
@@ -95,12 +121,19 @@ class Enhancer:
                 self._code, [each.view for each in ready], originals, predictions, [keyframe] * len(ready)
             )
             for each, unit, prediction in zip(ready, units, predictions, strict=True):
-                packets.append(Packet(each.track, index, time_ns, keyframe, unit))
+                found[each.view] = unit
                 if each.view in self._mirrors:
                     mirror = self._mirrors[each.view]
                     frame.add(each.view, mirror.push(unit, prediction, keyframe, each.track.topic))
             waiting = [each for each in waiting if each not in ready]
-        return packets
+        return found
+
+    def _fresh_encoders(self) -> dict[Position, Vp9ReferenceEncoder]:
+        return {each.view: Vp9ReferenceEncoder(self._coding) for each in self._order}
 
     def _code(self, view: Position, original: Planes, prediction: list[Planes], keyframe: bool) -> bytes:
         return self._encoders[view].push(original, prediction, keyframe)
+
+
+def _bits(units: Iterable[bytes]) -> int:
+    return 8 * sum(map(len, units))

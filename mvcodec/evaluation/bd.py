@@ -70,6 +70,21 @@ class AnchorLead:
     overtaking: Overtaking | None
 
 
+def hull(points: Sequence[RatePoint]) -> list[RatePoint]:
+    """The points that no mixture of two others beats, dB over the logarithm of the rate; ascending."""
+    kept: list[RatePoint] = []
+    for point in front(points):
+        while len(kept) > 1 and _slope(kept[-2], point) >= _slope(kept[-2], kept[-1]):
+            kept.pop()
+        kept.append(point)
+    return kept
+
+
+def _slope(one: RatePoint, other: RatePoint) -> float:
+    """dB for each e-fold of the rate."""
+    return (other[1] - one[1]) / float(np.log(other[0] / one[0]))
+
+
 def compare_curves(anchor: Sequence[RatePoint], tested: Sequence[RatePoint]) -> CurveDelta:
     """Bjontegaard's deltas of a tested curve.
 
