@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -165,3 +166,20 @@ def test_a_file_that_ends_early_says_so(tmp_path: Path) -> None:
     view.count = 9
     with pytest.raises(InputError, match=r"cam0\.mp4: found no whole picture 4, .*, expected 9 pictures"):
         list(view.pictures(range(9)))
+
+
+def test_what_a_file_says_and_is_left_aside_is_told(tmp_path: Path) -> None:
+    with av.open(str(tmp_path / "a.mkv"), "w") as out:
+        streams = [out.add_stream("libx264", rate=30) for _ in range(2)]
+        for stream in streams:
+            stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+            stream.codec_context.sample_aspect_ratio = Fraction(4, 3)
+        for stream in streams:
+            for number in range(3):
+                frame = av.VideoFrame(64, 48, "yuv420p")
+                frame.pts = number
+                out.mux(stream.encode(frame))
+            out.mux(stream.encode())
+    notes = VideoView(tmp_path / "a.mkv").notes
+    assert any("its pixels are 4:3, not square" in note for note in notes)
+    assert any("it has 2 videos: the first one is taken" in note for note in notes)

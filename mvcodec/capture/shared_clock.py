@@ -64,7 +64,8 @@ def common_times(
     for view, reader in views.items():
         own = known.get(view)
         if own is None:
-            own = tuple(round((stated.first_frame + n) * 1e9 / fps) for n in range(reader.count))
+            begin = stated.first_frame + reader.early
+            own = tuple(round((begin + n) * 1e9 / fps) for n in range(reader.count))
         shift = offsets.get(view, 0)
         times[view] = tuple(time + shift for time in own) if shift else own
     if timing.sync is not None and len(views) > 1:

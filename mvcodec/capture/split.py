@@ -111,7 +111,7 @@ class _Tile:
         self.size = width // cols, height // rows
         self._top, self._left = row * self.size[1], col * self.size[0]
         self.path, self.count = whole.reader.path, whole.reader.count
-        self.times_ns, self.fps = whole.reader.times_ns, whole.reader.fps
+        self.times_ns, self.fps, self.early = whole.reader.times_ns, whole.reader.fps, whole.reader.early
         self.notes = whole.reader.notes if (row, col) == (0, 0) else ()
 
     def readable(self, frames: Sequence[int], on_unreadable: OnUnreadable | None) -> Iterator[Picture | None]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import pairwise
 
 from mvcodec.array import MAX_FPS, MIN_FPS
 from mvcodec.capture.pairing import typical_step_ns
@@ -19,6 +20,7 @@ _STANDARD_RATES = tuple(
     for divisor in (1000, 1001)
 )
 _MEDIAN_SHARE = 1e-3
+_USUAL_SHARE = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +84,14 @@ def on_grid(times_ns: Sequence[int], rate: Fraction, unit_ns: float) -> tuple[in
 
 
 def rate_of_times(times_ns: Sequence[int]) -> float | None:
-    """Pictures a second by the median step, a usual rate where one is near; None for fewer than two."""
-    step = typical_step_ns(times_ns)
-    if not step:
+    """Pictures a second by the usual steps, a usual rate where one is near; None for fewer than two.
+
+    Pauses and what is missing don't count; rounded steps do all together.
+    """
+    typical = typical_step_ns(times_ns)
+    if not typical:
         return None
-    fps = 1e9 / step
+    near = [b - a for a, b in pairwise(times_ns) if abs(b - a - typical) <= _USUAL_SHARE * typical]
+    fps = 1e9 * len(near) / sum(near)
     nearest = min(_STANDARD_RATES, key=lambda rate: abs(float(rate) - fps))
     return float(nearest) if abs(float(nearest) - fps) <= _MEDIAN_SHARE * fps else round(fps, 3)

@@ -21,7 +21,7 @@ from av.video.stream import VideoStream
 from mvcodec.capture.orientation import UPRIGHT, Orientation, matrix_orientation
 from mvcodec.capture.picture_files import wrong_size
 from mvcodec.capture.reading import OnUnreadable
-from mvcodec.capture.video_times import read_times
+from mvcodec.capture.video_times import VideoTimes, read_times, with_data
 from mvcodec.errors import InputError
 from mvcodec.frames import Picture
 
@@ -42,6 +42,7 @@ _MATRICES = {
     9: Colorspace.BT2020,
 }
 _FIRST_HD_HEIGHT = 720
+_ALPHA = "how opaque its pixels are is left out"
 _HDR = {16: "PQ", 18: "HLG"}
 """ITU-T H.273 TransferCharacteristics of high dynamic range."""
 
@@ -54,6 +55,7 @@ class VideoView:
         size: (width, height) as shown, px.
         count: whole frames that are shown, by the packets and edit lists.
         times_ns: when they are shown, ascending; None where the file has no times.
+        early: see ViewReader.
         fps: its frame rate; 0 where nothing says so.
         notes: what is unusual about it, one line each.
 
@@ -67,18 +69,24 @@ class VideoView:
             with _opened(path) as container:
                 times = read_times(container, _video_stream(container, path))
             with _opened(path) as container:
-                first = next(container.decode(_video_stream(container, path)), None)
+                stream = _video_stream(container, path)
+                first = next(container.decode(stream), None)
+                self.notes = _stated_oddities(container, stream)
         except (av.error.FFmpegError, OSError) as error:
             raise _unreadable(path, error) from None
-        if times.count < 1 or first is None or min(first.width, first.height) < 1:
-            raise InputError(path, "no frames", "a video file")
-        self._stamps = times.stamps
-        self.count, self.times_ns, self.fps = times.count, times.times_ns, times.fps
+        if not times.stamps or first is None or min(first.width, first.height) < 1:
+            why = "; ".join(f"{count} are left out: {reason}" for reason, count in times.left_out.items())
+            raise InputError(path, f"no frames{f' ({why})' * bool(why)}", "a video file")
+        self._times = times
+        self.count, self.early = len(times.stamps), times.early
+        self.times_ns, self.fps = times.times_ns, times.fps
         self._coded_size = first.width, first.height
-        self._orientation, self.notes = _orientation(first)
+        self._orientation, notes = _orientation(first)
         self.size = self._orientation.size(*self._coded_size)
-        self.notes += unusual(first)
+        self.notes += notes + unusual(first)
         self.notes += tuple(f"{count} pictures are left out: {why}" for why, count in times.left_out.items())
+        if times.cut_off:
+            self.notes += (f"it breaks off after {self.count} pictures ({times.cut_off})",)
 
     def pictures(self, frames: Sequence[int]) -> Iterator[Picture]:
         """uint8 (H, W, 3) RGB of the frames of these numbers, which ascend, decoded as they are asked for.
@@ -101,7 +109,9 @@ class VideoView:
                 stream = _video_stream(container, self.path)
                 # The views are decoded side by side; threads within one would only compete.
                 stream.codec_context.thread_count = 1
-                for number, frame in self._numbered(_decoded(container, stream)):
+                for number, frame in _numbered(
+                    _decoded(container, stream, self._times.numbered), self._times
+                ):
                     while wanted and wanted[0] < number:
                         self._tell_unreadable(wanted.popleft(), on_unreadable)
                         yield None
@@ -128,39 +138,69 @@ class VideoView:
             raise error
         on_unreadable(error)
 
-    def _numbered(self, frames: Iterator[VideoFrame]) -> Iterator[tuple[int, VideoFrame]]:
-        """Decoded frames with their numbers; without those that are left out."""
-        if not self._stamps:
-            yield from enumerate(frames)
-            return
-        numbers = {stamp: number for number, stamp in enumerate(self._stamps)}
-        for frame in frames:
-            if frame.pts in numbers:
-                yield numbers[frame.pts], frame
+
+def _numbered(frames: Iterator[VideoFrame | None], times: VideoTimes) -> Iterator[tuple[int, VideoFrame]]:
+    """Decoded frames with their numbers; without those that are left out."""
+    numbers = {stamp: number for number, stamp in enumerate(times.stamps)}
+    count = 0
+    for frame in frames:
+        if frame is None:
+            if times.counted:
+                return  # how many are missing is unknown
+        elif frame.pts in numbers:
+            yield count if times.counted else numbers[frame.pts], frame
+            count += 1
 
 
-def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[VideoFrame]:
-    """The whole pictures: a damaged one, and what builds on it, is left out."""
+def _decoded(container: InputContainer, stream: VideoStream, numbered: bool) -> Iterator[VideoFrame | None]:
+    """The whole pictures; None for a damaged one, and for what builds on it.
+
+    Args:
+        numbered: pictures are called by the numbers of their packets.
+    """
     lost = False
-    for packet in container.demux(stream):
+    for number, packet in enumerate(with_data(container, stream)):
+        if numbered:
+            packet.pts = packet.dts = number
         try:
             frames = packet.decode()
-        except av.error.EOFError:
-            return
         except av.error.FFmpegError:
             lost = True
+            yield None
             continue
         for frame in frames:
             lost = frame.is_corrupt or (lost and not frame.key_frame)
-            if not lost:
-                yield frame
+            yield None if lost else frame
+    if not lost:
+        yield from stream.codec_context.decode(None)
+
+
+def _stated_oddities(container: InputContainer, stream: VideoStream) -> tuple[str, ...]:
+    """What a file says of its pictures that is left aside, one line each."""
+    notes = []
+    ratio = stream.sample_aspect_ratio
+    if ratio and ratio != 1:
+        notes.append(
+            f"its pixels are {ratio.numerator}:{ratio.denominator}, not square: they are taken as they are,"
+            " and pictures look squeezed; scale it first"
+        )
+    if stream.metadata.get("alpha_mode") == "1":
+        notes.append(_ALPHA)
+    others = [
+        each
+        for each in container.streams.video
+        if each is not stream and not each.disposition & (Disposition.attached_pic | Disposition.still_image)
+    ]
+    if others:
+        notes.append(f"it has {1 + len(others)} videos: the first one is taken, stream {stream.index}")
+    return tuple(notes)
 
 
 def unusual(frame: VideoFrame) -> tuple[str, ...]:
     """What is done to pictures like this one that their owner should know, one line each."""
     notes = []
     if any(component.is_alpha for component in frame.format.components):
-        notes.append("how opaque its pixels are is left out")
+        notes.append(_ALPHA)
     if frame.interlaced_frame:
         notes.append("its pictures are interlaced: lines of two moments are mixed; deinterlace it first")
     transfer = int(frame.color_trc)

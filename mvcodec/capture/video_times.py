@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from av.bitstream import BitStreamFilterContext
 from av.container import InputContainer
+from av.error import FFmpegError
 from av.format import Flags
 from av.packet import Packet
 from av.video.stream import VideoStream
 
+from mvcodec.capture.pairing import typical_step_ns
 from mvcodec.capture.timing import on_grid, rate_of_times, steady_rate
-from mvcodec.capture.whole_pictures import NOT_STARTED, WholePictures
+from mvcodec.capture.whole_pictures import BUILDS_ON_LOSS, NOT_STARTED, WholePictures
 
 _TIMELESS = frozenset({"h264", "hevc", "m4v", "mpegvideo", "mjpeg", "obu", "vvc", "cavsvideo", "dirac"})
 """Streams of pictures alone; what FFmpeg gives as their times is made up."""
 
 _BY_DECODING_TIME = frozenset({"avi"})
 """Containers without presentation times: FFmpeg's are a picture late."""
+
+_BESIDE_GAP = "an AVI file with B-pictures does not say when those beside a gap are shown"
+_DAMAGED = "damaged"
+_SAME_TIME = "they have the time of the picture before"
+_UNKNOWN_TIME = "how many pictures are missing before them is unknown, since the stream has no times"
+
+_MS = 1_000_000
 
 _ANNEX_B = {"h264": "h264_mp4toannexb", "hevc": "hevc_mp4toannexb"}
 
@@ -29,27 +39,35 @@ class VideoTimes:
     """The pictures of a video file that are whole, in the order of their time.
 
     Attributes:
-        stamps: what the decoder will call them (pts); empty where the container has none, and they come
-            in order.
+        stamps: what the decoder will call them (pts), or the numbers of their packets, ascending.
+        numbered: stamps are numbers of packets.
+        counted: pictures come in the order of their time, but not in that of their packets.
         times_ns: when they are shown, ascending; None where the container has no times.
-        count: pictures.
+        early: pictures before the first whole one, where there are no times.
         fps: pictures a second; 0 where nothing says so.
         left_out: how many pictures are left out, by the reason.
+        cut_off: why the file could not be read to its end; empty where it could.
     """
 
     stamps: tuple[int, ...]
+    numbered: bool
+    counted: bool
     times_ns: tuple[int, ...] | None
-    count: int
+    early: int
     fps: float
-    left_out: dict[str, int]
+    left_out: Mapping[str, int]
+    cut_off: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class _Shown:
-    """A packet whose picture is whole."""
+class _Packet:
+    """A packet in coding order; `why` says why its picture is not whole."""
 
+    number: int
     pts: int | None
     dts: int | None
+    keyframe: bool
+    why: str | None
 
 
 def read_times(container: InputContainer, stream: VideoStream) -> VideoTimes:
@@ -58,48 +76,119 @@ def read_times(container: InputContainer, stream: VideoStream) -> VideoTimes:
     Raises:
         av.error.FFmpegError: it is damaged.
     """
-    left_out: dict[str, int] = {}
-    shown = list(_whole(container, stream, left_out))
-    stamps = [item.pts for item in shown if item.pts is not None]
+    broken: list[str] = []
+    packets = list(_packets(container, stream, broken.append))
+    cut_off = "".join(broken)
+    left_out = Counter(packet.why for packet in packets if packet.why is not None)
+    whole = [packet for packet in packets if packet.why is None]
     timeless = Flags.no_timestamps in Flags(container.format.flags) or container.format.name in _TIMELESS
-    if timeless or not shown or len(set(stamps)) < len(shown):
-        return VideoTimes((), None, len(shown), _stated_rate(stream), left_out)
-    stamps.sort()
+    timeless |= any(packet.pts is None for packet in whole)
+    reordered = bool(stream.codec_context.has_b_frames)
+    early = left_out[NOT_STARTED] if timeless else 0
+    if timeless or container.format.name in _BY_DECODING_TIME:
+        whole = _placed(packets, reordered, timeless, left_out)
+        numbers = tuple(packet.number for packet in whole)
+        ticks = sorted({packet.dts for packet in whole if packet.dts is not None})
+        if timeless or len(ticks) < len(whole):
+            return VideoTimes(numbers, True, reordered, None, early, _stated_rate(stream), left_out, cut_off)
+        times, fps = _times(ticks, stream)
+        return VideoTimes(numbers, True, reordered, times, 0, fps, left_out, cut_off)
+    stamps = sorted({packet.pts for packet in whole if packet.pts is not None})
+    if len(stamps) < len(whole):
+        left_out[_SAME_TIME] = len(whole) - len(stamps)
+    times, fps = _times(stamps, stream)
+    return VideoTimes(tuple(stamps), False, False, times, 0, fps, left_out, cut_off)
+
+
+def _times(ticks: Sequence[int], stream: VideoStream) -> tuple[tuple[int, ...], float]:
+    """Times in ns and the frame rate, of times in the stream's unit."""
+    if not ticks:
+        return (), 0.0
     assert stream.time_base is not None
-    unit_ns = float(stream.time_base * 10**9)
-    ticks = stamps
-    if container.format.name in _BY_DECODING_TIME:
-        ticks = sorted(item.dts for item in shown if item.dts is not None)
-        ticks = ticks if len(ticks) == len(stamps) else stamps
     times = tuple(round(tick * stream.time_base * 10**9) for tick in ticks)
+    unit_ns = float(stream.time_base * 10**9)
+    if all(time % _MS == 0 for time in times):
+        unit_ns = max(unit_ns, float(_MS))  # a container that counts milliseconds was there before this one
     stated = [Fraction(r) for r in (stream.guessed_rate, stream.average_rate, stream.base_rate) if r]
     rate = steady_rate(times, unit_ns, stated)
-    if rate is not None:
-        times = on_grid(times, rate, unit_ns)
-    fps = float(rate) if rate is not None else rate_of_times(times) or _stated_rate(stream)
-    return VideoTimes(tuple(stamps), times, len(shown), fps, left_out)
+    if rate is None:
+        return times, rate_of_times(times) or _stated_rate(stream)
+    return on_grid(times, rate, unit_ns), float(rate)
 
 
-def _whole(container: InputContainer, stream: VideoStream, left_out: dict[str, int]) -> Iterator[_Shown]:
-    """The packets, in coding order, whose pictures are shown and are whole; counts the others."""
+def _placed(
+    packets: Sequence[_Packet], reordered: bool, timeless: bool, left_out: Counter[str]
+) -> list[_Packet]:
+    """The whole pictures whose place in time is certain, though only the order of packets tells it.
+
+    Args:
+        reordered: pictures are shown in another order than coded: what is missing moves all of its GOP.
+        timeless: what is missing moves all that follows.
+        left_out: counts the others.
+    """
+    placed: list[_Packet] = []
+    group: list[_Packet] = []
+    lost = gap = False
+    step = 0 if timeless else typical_step_ns([packet.dts or 0 for packet in packets])
+    before: int | None = None
+    for packet in packets:
+        if packet.keyframe:
+            placed += group
+            group, gap = [], False
+        if reordered and step and before is not None and (packet.dts or 0) - before > step:
+            left_out[_BESIDE_GAP] += len(group)
+            group, gap = [], not packet.keyframe
+        before = packet.dts
+        if packet.why not in (None, NOT_STARTED):
+            lost = True
+            if reordered:
+                left_out[BUILDS_ON_LOSS] += len(group)
+                group = []
+        elif packet.why is None and (gap or (lost and timeless)):
+            left_out[_BESIDE_GAP if gap else _UNKNOWN_TIME] += 1
+        elif packet.why is None:
+            group.append(packet)
+    return placed + group
+
+
+def _packets(
+    container: InputContainer, stream: VideoStream, cut_off: Callable[[str], None]
+) -> Iterator[_Packet]:
+    """The packets whose pictures are shown, in coding order."""
     name = stream.codec_context.name
     whole = WholePictures(name)
     plain = BitStreamFilterContext(_ANNEX_B[name], stream) if name in _ANNEX_B else None
     started, first = False, None
-    for packet in container.demux(stream):
-        if not packet.size:
-            continue
-        pts, dts, discard = packet.pts, packet.dts, packet.is_discard
-        started = started or packet.is_keyframe
+    for number, packet in enumerate(with_data(container, stream, cut_off)):
+        pts, dts, discard, keyframe = packet.pts, packet.dts, packet.is_discard, packet.is_keyframe
+        started = started or keyframe
         first = pts if first is None and started else first
         why = _reason(packet, plain, whole)
         if why is None and (not started or (pts is not None and first is not None and pts < first)):
             # Pictures that are shown before the first keyframe build on what came before it.
             why = NOT_STARTED
-        if why is not None:
-            left_out[why] = left_out.get(why, 0) + 1
-        elif not discard:
-            yield _Shown(pts, dts)
+        if why is not None or not discard:
+            yield _Packet(number, pts, dts, keyframe, why)
+
+
+def with_data(
+    container: InputContainer, stream: VideoStream, cut_off: Callable[[str], None] = lambda _why: None
+) -> Iterator[Packet[VideoStream]]:
+    """The packets that hold something: their places are their numbers.
+
+    Args:
+        cut_off: told why a file cannot be read to its end, where it has a beginning.
+    """
+    count = 0
+    try:
+        for packet in container.demux(stream):
+            if packet.size:
+                yield packet
+                count += 1
+    except FFmpegError as error:
+        if not count:
+            raise
+        cut_off(error.strerror or "damaged")
 
 
 def _reason(
@@ -107,7 +196,11 @@ def _reason(
 ) -> str | None:
     """Why a packet gives no whole picture. The filter takes the packet's data away."""
     pts = packet.pts
-    units = [packet] if plain is None else plain.filter(packet)
+    try:
+        units = [packet] if plain is None else plain.filter(packet)
+    except FFmpegError:
+        whole.lose(BUILDS_ON_LOSS)
+        return _DAMAGED
     return whole.push(b"".join(bytes(unit) for unit in units), pts)[0]
 
 

@@ -37,6 +37,11 @@ class ViewReader(Protocol):
         ...
 
     @property
+    def early(self) -> int:
+        """Pictures that the file has before the first whole one, where it has no times."""
+        ...
+
+    @property
     def fps(self) -> float:
         """Pictures a second, as the file says; 0 where nothing does."""
         ...
@@ -70,7 +75,7 @@ class PictureView:
         self.path = paths[0]
         self.count = len(paths)
         self.times_ns: tuple[int, ...] | None = None
-        self.fps = 0.0
+        self.early, self.fps = 0, 0.0
         facts = picture_facts(paths[0])
         self.size = facts.size
         self.notes = ("how opaque its pixels are is left out",) if facts.alpha else ()
