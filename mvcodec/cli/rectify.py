@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from mvcodec.capture import ArraySource, open_input, resolve_frames
@@ -19,15 +20,25 @@ from mvcodec.cli.paths import (
 from mvcodec.cli.progress import progress
 from mvcodec.errors import SettingError
 from mvcodec.evaluation.rig_report import rig_report
+from mvcodec.frames import FrameSet
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
 from mvcodec.output.atomic import write_bytes
-from mvcodec.rigs.calibration import Calibrated, Wishes, calibrate_from_files, calibrate_from_scene
+from mvcodec.rigs.board import EXPECTED, Board, Sightings, find_board
+from mvcodec.rigs.calibration import (
+    Calibrated,
+    Wishes,
+    calibrate_from_board,
+    calibrate_from_files,
+    calibrate_from_scene,
+    spread_frame_sets,
+)
 from mvcodec.rigs.framing import CROPS
+from mvcodec.rigs.from_board import LENS_CHOICES
 from mvcodec.rigs.remap import DEFAULT_INTERPOLATION, INTERPOLATIONS, RectifiedSource, Rectifier
 from mvcodec.rigs.rig import rig_text
 
 RIG_NAME = "rig.json"
-WAYS = ("scene", "file")
+WAYS = ("scene", "board", "file")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,6 +69,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="FILE",
         help="of the cameras in row order: Kalibr, EuRoC or ROS YAML; or one RIG.json",
+    )
+    parser.add_argument("--board", metavar="BOARD", help=f"what was filmed: {EXPECTED}")
+    parser.add_argument(
+        "--board-input",
+        type=local_path,
+        nargs="+",
+        metavar="FOLDER|VIDEO",
+        help="the same cameras while they saw the board (default: INPUT)",
+    )
+    parser.add_argument(
+        "--lens",
+        choices=LENS_CHOICES,
+        default="auto",
+        help="model of the lenses, with --board (default: the one that fits)",
     )
     parser.add_argument(
         "--crop",
@@ -114,14 +139,49 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def _calibrated(source: ArraySource, chosen: range, arguments: argparse.Namespace) -> Calibrated:
-    way = arguments.how or ("file" if arguments.calibration else "scene")
+    given = "file" if arguments.calibration else "board" if arguments.board else "scene"
+    way = arguments.how or given
+    if (way == "board") != (arguments.board is not None):
+        found = f"{'one' if arguments.board else 'none'} with --from {way}"
+        raise SettingError("board", found, f"--from board, and {EXPECTED}")
+    if arguments.board_input and way != "board":
+        raise SettingError("board input", arguments.board_input[0], "--board, which says what it shows")
     if (way == "file") != bool(arguments.calibration):
         found = f"{len(arguments.calibration or [])} files with --from {way}"
         raise SettingError("calibration", found, "--from file, and the files of the cameras in row order")
     wishes = Wishes(arguments.crop, arguments.size)
     if way == "file":
         return calibrate_from_files(source, chosen, arguments.calibration, wishes)
+    if way == "board":
+        shown = _board_source(source, arguments)
+        sightings = _sightings(Board.from_text(arguments.board), shown, quiet=arguments.quiet)
+        return calibrate_from_board(source, chosen, sightings, shown.name, arguments.lens, wishes)
     return calibrate_from_scene(source, chosen, wishes)
+
+
+def _board_source(source: ArraySource, arguments: argparse.Namespace) -> ArraySource:
+    """The pictures that show the board."""
+    if arguments.board_input is None:
+        return source
+    array = source.array
+    grid = None if len(arguments.board_input) == 1 else (array.rows, array.cols)
+    shown = open_input(arguments.board_input, grid=grid, real="all")
+    if (shown.array.rows, shown.array.cols) != (array.rows, array.cols):
+        found = f"{shown.array.rows}x{shown.array.cols} cameras in {shown.name}"
+        raise SettingError("board input", found, f"{array.rows}x{array.cols}, the cameras of INPUT")
+    return shown
+
+
+def _sightings(board: Board, shown: ArraySource, *, quiet: bool) -> Sightings:
+    array = shown.array
+    with progress("board", None, quiet=quiet) as bar:
+
+        def told() -> Iterator[FrameSet]:
+            for frame_set in spread_frame_sets(shown):
+                yield frame_set
+                bar.update()
+
+        return find_board(board, told(), array.positions, (array.width, array.height))
 
 
 def _write_folder(

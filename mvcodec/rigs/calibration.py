@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,16 +13,20 @@ from mvcodec.capture.source import ArraySource
 from mvcodec.errors import InputError
 from mvcodec.frames import FrameSet
 from mvcodec.rigs.adjustment import adjust
+from mvcodec.rigs.board import Sightings
 from mvcodec.rigs.calibration_files import KnownCamera, read_cameras
 from mvcodec.rigs.colour_match import matched_colours
 from mvcodec.rigs.features import PairCount, Tracks, find_tracks
 from mvcodec.rigs.framing import Crop
-from mvcodec.rigs.from_scene import check_shared, rig_from_adjusted
+from mvcodec.rigs.from_board import LensChoice, cameras_from_board
+from mvcodec.rigs.from_scene import FEWEST_POINTS, check_shared, rig_from_adjusted
 from mvcodec.rigs.known import rig_from_cameras
 from mvcodec.rigs.residuals import Residuals, disparities, rectified_tracks, residuals_of
 from mvcodec.rigs.rig import Rig, read_rig
+from mvcodec.stream import view_name
 
 MOST_FRAME_SETS = 4
+MOST_BOARD_SETS = 150
 BEYOND_PX = 3.0
 """Points that far off from a known rig are wrong matches, or things that move."""
 
@@ -134,6 +138,48 @@ def calibrate_known(
     return _finished(rig, frame_sets, every, tracks, pairs)
 
 
+def calibrate_from_board(
+    source: ArraySource,
+    chosen: range,
+    sightings: Sightings,
+    name: str,
+    lens: LensChoice = "auto",
+    wishes: Wishes | None = None,
+) -> Calibrated:
+    """The rig that a board tells; baselines are metric.
+
+    Args:
+        source, chosen, wishes: as in `calibrate_from_scene`.
+        sightings: of the board, see `find_board`.
+        name: of the pictures that show it, for messages.
+        lens: see `cameras_from_board`.
+
+    Raises:
+        InputError: see `cameras_from_board`; or the board's cameras don't fit the input.
+    """
+    told = cameras_from_board(sightings, name, lens)
+    found = calibrate_known(source, chosen, told.cameras, name, "board", wishes)
+    figures = dict(found.rig.figures) | {
+        "board": {
+            "text": sightings.board.text,
+            "rms_px": told.rms_px,
+            "corners_left_out": told.left_out,
+            "sightings": {
+                view_name(at): count for at, count in zip(sightings.cameras, told.sightings, strict=True)
+            },
+        }
+    }
+    return replace(found, rig=replace(found.rig, figures=figures))
+
+
+def spread_frame_sets(source: ArraySource, most: int = MOST_BOARD_SETS) -> Iterator[FrameSet]:
+    """Up to so many frame sets of a whole input, evenly spread, with every camera's picture."""
+    every = -(-source.frame_count // most)
+    for number, frame_set in enumerate(source.frame_sets(None, source.array.positions)):
+        if number % every == 0:
+            yield frame_set
+
+
 def some_frame_sets(source: ArraySource, chosen: range) -> list[FrameSet]:
     """Up to MOST_FRAME_SETS of the input, far apart, with every camera's picture."""
     indices = np.linspace(0, len(chosen) - 1, min(len(chosen), MOST_FRAME_SETS))
@@ -176,7 +222,7 @@ def left_by_places_px(rig: Rig, tracks: Tracks) -> float:
 def _finished(
     rig: Rig, frame_sets: list[FrameSet], every: Tracks, tracks: Tracks, pairs: list[PairCount]
 ) -> Calibrated:
-    if not len(tracks.seen):
+    if not len(tracks.seen) and len(every.seen) >= FEWEST_POINTS:
         found = "no point of the scene in the pictures that agrees with the calibration"
         raise InputError("rig", found, "the calibration of these cameras, in this order")
     rig = matched_colours(rig, tracks, frame_sets)
