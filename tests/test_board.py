@@ -217,4 +217,4 @@ def test_the_command_finds_a_metric_rig_from_a_board(tmp_path: Path) -> None:
     assert array["calibration"]["baseline_m"] == pytest.approx(STEP_M, rel=0.03)
     wrong = rectify(tmp_path / "in", tmp_path / "rig.json", "--from", "board")
     assert wrong.returncode == 2
-    assert "board: found none with --from board" in wrong.stderr
+    assert "--board: found none with --from board" in wrong.stderr

@@ -145,7 +145,7 @@ def _calibrated(source: ArraySource, chosen: range, arguments: argparse.Namespac
         found = f"{'one' if arguments.board else 'none'} with --from {way}"
         raise SettingError("board", found, f"--from board, and {EXPECTED}")
     if arguments.board_input and way != "board":
-        raise SettingError("board input", arguments.board_input[0], "--board, which says what it shows")
+        raise SettingError("board_input", arguments.board_input[0], "--board, which says what it shows")
     if (way == "file") != bool(arguments.calibration):
         found = f"{len(arguments.calibration or [])} files with --from {way}"
         raise SettingError("calibration", found, "--from file, and the files of the cameras in row order")
@@ -168,7 +168,7 @@ def _board_source(source: ArraySource, arguments: argparse.Namespace) -> ArraySo
     shown = open_input(arguments.board_input, grid=grid, real="all")
     if (shown.array.rows, shown.array.cols) != (array.rows, array.cols):
         found = f"{shown.array.rows}x{shown.array.cols} cameras in {shown.name}"
-        raise SettingError("board input", found, f"{array.rows}x{array.cols}, the cameras of INPUT")
+        raise SettingError("board_input", found, f"{array.rows}x{array.cols}, the cameras of INPUT")
     return shown
 
 

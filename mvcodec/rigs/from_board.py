@@ -139,7 +139,7 @@ def _check_seen(sightings: Sightings, name: str) -> None:
         raise InputError(
             name,
             f"no {text} in any picture of {total} frame sets",
-            "another --board, or pictures that show it whole",
+            "another `board`, or pictures that show it whole",
         )
     counts = sightings.seen.any(axis=2).sum(axis=0)
     if counts.min() < FEWEST_SIGHTINGS:
