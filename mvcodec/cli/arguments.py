@@ -40,7 +40,6 @@ OPTIONS = {
     "bits": "--bits",
     "board": "--board",
     "board_input": "--board-input",
-    "calibration": "--calibration",
     "clock": "--clock",
     "focus_px": "--refocus",
     "convergence_px": "--convergence",
