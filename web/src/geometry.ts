@@ -45,11 +45,21 @@ export function cellRho(header: Header): number {
   return step.row && step.col ? (header.rho * step.row) / step.col : 1;
 }
 
-/** The nearest viewpoint that can be shown: between the outermost cameras; without maps, a camera's own. */
+/** Whether a real camera's pictures are coded without those of others. */
+export function playsAlone(header: Header, camera: Camera): boolean {
+  return !header.predicted.some(([row, col]) => row === camera.row && col === camera.col);
+}
+
+/** Whether there are views between the cameras: with maps, and where the pictures of all cameras can be decoded. */
+export function isSynthesised(header: Header): boolean {
+  return header.mapCameras !== "none" && header.predicted.length === 0;
+}
+
+/** The nearest viewpoint that can be shown: between the outermost cameras, or a camera's own where nothing lies between. */
 export function clampView(header: Header, view: Viewpoint): Viewpoint {
   const clamp = (value: number, most: number) => (Number.isFinite(value) ? Math.min(Math.max(value, 0), most) : 0);
   const inside = { row: clamp(view.row, header.rows - 1), col: clamp(view.col, header.cols - 1) };
-  return header.mapCameras === "none" ? nearestCamera(header, inside) : inside;
+  return isSynthesised(header) ? inside : nearestCamera(header, inside);
 }
 
 /** What a pixel moves for each px of disparity, from a view to a camera. */
@@ -60,11 +70,12 @@ export function shiftTo(header: Header, view: Viewpoint, camera: Camera): [numbe
   return [across, cellRho(header) * down];
 }
 
-/** The real camera nearest to a viewpoint. */
+/** The real camera nearest to a viewpoint whose pictures can be decoded. */
 export function nearestCamera(header: Header, view: Viewpoint): Camera {
-  const nearest = (places: readonly number[], value: number) =>
-    places.reduce((best, place) => (Math.abs(place - value) < Math.abs(best - value) ? place : best));
-  return { row: nearest(header.realRows, view.row), col: nearest(header.realCols, view.col) };
+  const away = ({ row, col }: Camera) => (row - view.row) ** 2 + (col - view.col) ** 2;
+  return cameras(header)
+    .filter((camera) => playsAlone(header, camera))
+    .reduce((best, camera) => (away(camera) < away(best) ? camera : best));
 }
 
 /** The span of neighbouring places that a coordinate lies in, the lower one on a border. */
@@ -82,6 +93,10 @@ function spanOf(places: readonly number[], value: number): [number, number] {
 export function contributors(
   header: Header, view: Viewpoint, present: (camera: Camera) => boolean = () => true,
 ): Contributor[] {
+  if (!isSynthesised(header)) {
+    const camera = nearestCamera(header, view);
+    return present(camera) ? [{ camera, shift: [0, 0], weight: 1 }] : [];
+  }
   const [top, bottom] = spanOf(header.realRows, view.row);
   const [left, right] = spanOf(header.realCols, view.col);
   const step = steps(header);

@@ -6,7 +6,7 @@ import { contributors } from "../src/geometry.ts";
 
 const HEADER = {
   rows: 1, cols: 3, width: 40, height: 9, realRows: [0], realCols: [0, 2], rho: 1, range: [0, 255], mapScale: 1,
-  mapCameras: "alternate", calibration: { dInf: 0, given: true, fx: 40, fy: 40, baselineM: 1 },
+  mapCameras: "alternate", predicted: [], calibration: { dInf: 0, given: true, fx: 40, fy: 40, baselineM: 1 },
 } as unknown as Header;
 
 test("the camera beside one that sends a map is derived from it", () => {

@@ -24,6 +24,13 @@ test("files without maps are of version 2", () => {
   assert.equal(parse({ ...GOOD, version: 2, disparity_cameras: "none" }).mapCameras, "none");
 });
 
+test("cameras that are predicted from others are known by their places", () => {
+  const prediction = { predictor: "warp-1", codec: "vp9", cameras: [{ camera: [0, 2], from: [[0, 0]] }] };
+  assert.deepEqual(parse({ ...GOOD, version: 2, prediction }).predicted, [[0, 2]]);
+  const wrong = { ...prediction, cameras: [{ camera: [1, 2], from: [[0, 0]] }] };
+  assert.throws(() => parse({ ...GOOD, version: 2, prediction: wrong }), FileError);
+});
+
 for (const [what, document] of Object.entries({
   "another format": { ...GOOD, format: "other" },
   "a later version": { ...GOOD, version: 3 },

@@ -7,9 +7,10 @@ export type Codec = "h264" | "hevc" | "av1" | "vp9";
 export type MapCameras = "all" | "alternate" | "none";
 
 const CODECS: readonly Codec[] = ["h264", "hevc", "av1", "vp9"];
-/** Version 2 adds files without maps. */
+/** Version 2 adds files without maps, and cameras that are predicted from others. */
 const VERSIONS = [1, 2];
 const VERSION_WITHOUT_MAPS = 2;
+const VERSION_WITH_PREDICTION = 2;
 const MOST_SIDE = 1024;
 const MOST_PIXELS = 16384;
 
@@ -41,6 +42,8 @@ export interface Header {
   readonly mapScale: 1 | 2;
   /** Which real cameras send a map. */
   readonly mapCameras: MapCameras;
+  /** [row, col] of the cameras whose pictures are coded from those of others, in a way that browsers cannot decode. */
+  readonly predicted: readonly (readonly [number, number])[];
   /** As it stands in the file, for those who compare it. */
   readonly document: unknown;
 }
@@ -108,7 +111,8 @@ export function parseHeader(text: Uint8Array): Header {
   if (!VERSIONS.includes(version)) throw fields.wrong("version", version, `version ${VERSIONS.join(" or ")}, which this player reads`);
   const codec = fields.get("codec") as Codec;
   if (!CODECS.includes(codec)) throw fields.wrong("codec", codec, CODECS.join(", "));
-  return { codec, ...readArray(fields.inner("array")), ...readMaps(fields, version), document };
+  const array = readArray(fields.inner("array"));
+  return { codec, ...array, ...readMaps(fields, version), predicted: readPredicted(fields, version, array), document };
 }
 
 function readArray(array: Fields) {
@@ -153,6 +157,21 @@ function readMaps(fields: Fields, version: number) {
   const known = version >= VERSION_WITHOUT_MAPS ? ["all", "alternate", "none"] : ["all", "alternate"];
   if (!known.includes(mapCameras)) throw fields.wrong("disparity_cameras", mapCameras, known.join(", "));
   return { range, mapScale, mapCameras } as const;
+}
+
+/** The cameras that a prediction names; at least one other must play alone. */
+function readPredicted(fields: Fields, version: number, array: ReturnType<typeof readArray>): [number, number][] {
+  if (version < VERSION_WITH_PREDICTION || fields.get("prediction", null) === null) return [];
+  const prediction = fields.inner("prediction");
+  const cameras = prediction.get("cameras");
+  const all = array.realRows.length * array.realCols.length;
+  if (!Array.isArray(cameras) || cameras.length >= all) throw prediction.wrong("cameras", cameras, `a list of fewer than ${all} cameras`);
+  return cameras.map((one: unknown) => {
+    const place = new Fields(one, "prediction.cameras").get("camera");
+    const isReal = Array.isArray(place) && place.length === 2 && array.realRows.includes(place[0]) && array.realCols.includes(place[1]);
+    if (!isReal) throw prediction.wrong("cameras", place, "[row, col] of a real camera");
+    return [place[0], place[1]];
+  });
 }
 
 /** Equally spaced places from the first to the last. */

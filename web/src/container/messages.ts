@@ -1,7 +1,7 @@
 /** The messages and topics of a file (see FORMAT.md): what is coded, and where it belongs. */
 
 import { BinaryReader, WireType } from "@bufbuild/protobuf/wire";
-import { cameras, type Camera } from "../geometry.ts";
+import { cameras, playsAlone, type Camera } from "../geometry.ts";
 import type { Header } from "./header.ts";
 import { FileError } from "./limits.ts";
 
@@ -40,11 +40,12 @@ export function sendsMap(header: Header, camera: Camera): boolean {
   return sum % 2 === 0;
 }
 
-/** Every video stream that the header announces: pictures, then maps, cameras in row order. */
+/** Every video stream that a browser can decode: pictures, then maps, cameras in row order. */
 export function tracksOf(header: Header): Track[] {
   const all = cameras(header);
   const track = (kind: TrackKind) => (camera: Camera) => ({ topic: topicOf(camera, kind), kind, camera });
-  return [...all.map(track("video")), ...all.filter((camera) => sendsMap(header, camera)).map(track("disparity"))];
+  const alone = all.filter((camera) => playsAlone(header, camera));
+  return [...alone.map(track("video")), ...all.filter((camera) => sendsMap(header, camera)).map(track("disparity"))];
 }
 
 /** Fields of `foxglove.CompressedVideo`. */

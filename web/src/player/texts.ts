@@ -26,6 +26,9 @@ export const TEXTS = {
   live: "live",
   noFile: "Drop an .mcap file here, or open one",
   noMaps: "This file has no disparity maps: the nearest camera is shown",
+  predicted: (count: number) =>
+    `${count} of this file's cameras are coded from the others, which browsers cannot decode: the nearest of the other cameras is shown. ` +
+    "mvcodec play --renderer server shows all views",
   noWebCodecs:
     "This page may not decode video here: browsers allow it on https:// and on this machine only. Try mvcodec play --renderer server",
   disparity: (px: number, metres: number | undefined) =>

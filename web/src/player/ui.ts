@@ -110,7 +110,8 @@ export class Ui {
     const engine = this.#engine!;
     this.controls.setRange(engine.header.range);
     this.#big.hidden = engine.count < 2 || this.#host.hasAttribute("autoplay");
-    if (engine.header.mapCameras === "none") this.tell(TEXTS.noMaps);
+    if (engine.header.predicted.length > 0) this.tell(TEXTS.predicted(engine.header.predicted.length));
+    else if (engine.header.mapCameras === "none") this.tell(TEXTS.noMaps);
     const isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const sways = !this.#isTouched && !isViewGiven && !isStill;
     this.looking.attach(engine, sways);
