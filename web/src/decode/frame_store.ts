@@ -1,6 +1,7 @@
 /** Any frame of a recording, decoded: only the tracks that are asked for, the latest ones kept. */
 
 import type { Tell } from "../container/assembly.ts";
+import type { Header } from "../container/header.ts";
 import { sendsMap, topicOf } from "../container/messages.ts";
 import { keySpanAt, spanAt, timeOf, type Recording } from "../container/recording.ts";
 import type { Camera } from "../geometry.ts";
@@ -111,7 +112,10 @@ export class FrameStore {
   #track(topic: string): TrackState {
     let track = this.#tracks.get(topic);
     if (track === undefined) {
-      const decoder = new TrackDecoder(this.#recording.header.codec, (frame, planes) => this.#keep(`${topic}@${frame}`, planes));
+      const size = codedSize(this.#recording.header, topic);
+      const decoder = new TrackDecoder(this.#recording.header.codec, (frame, planes) => {
+        if (planes.width === size.width && planes.height === size.height) this.#keep(`${topic}@${frame}`, planes);
+      });
       track = { decoder, tail: Promise.resolve() };
       this.#tracks.set(topic, track);
     }
@@ -137,7 +141,7 @@ export class FrameStore {
     const units: Unit[] = [];
     for (let at = first; at <= last; at++) units.push(await this.#unit(topic, at));
     const end = units.findIndex((unit) => unit.frame > frame && (unit.isKey || unit.data === undefined));
-    const isThere = await decoder.decode(end < 0 ? units : units.slice(0, end), frame);
+    const isThere = (await decoder.decode(end < 0 ? units : units.slice(0, end), frame)) && this.#planes.has(`${topic}@${frame}`);
     if (!isThere && !this.#told.has(`${topic}@${key}`)) {
       this.#told.add(`${topic}@${key}`);
       const at = timeOf(this.#recording.spans, frame).toFixed(3);
@@ -159,6 +163,13 @@ export class FrameStore {
     }
     return from;
   }
+}
+
+/** What a track's pictures measure: the sides of its pictures or maps, rounded up to even numbers. */
+function codedSize({ width, height, mapScale }: Header, topic: string): { width: number; height: number } {
+  const scale = topic.endsWith("/disparity") ? mapScale : 1;
+  const even = (side: number) => 2 * Math.ceil(Math.ceil(side / scale) / 2);
+  return { width: even(width), height: even(height) };
 }
 
 /** The upper left part of a plane. */

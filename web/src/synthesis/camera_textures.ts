@@ -1,11 +1,11 @@
-/** Real cameras on the GPU: decoded planes made ready for fetching, one layer of an array texture each. */
+/** Real cameras on the GPU: one layer of each array texture for each. */
 
 import type { Header } from "../container/header.ts";
 import type { Camera } from "../geometry.ts";
 import type { Planes } from "../decode/planes.ts";
 import blocksShader from "./blocks.frag.glsl";
 import fullShader from "./full.vert.glsl";
-import { clampAndFilter, framebufferOf, makeProgram, Texture, type Program } from "./gl.ts";
+import { ArrayTexture, framebufferOf, makeProgram, Texture, type Program } from "./gl.ts";
 import prepareShader from "./prepare.frag.glsl";
 
 /** The cameras of a cell. */
@@ -18,113 +18,116 @@ const AGREEMENT_PX = 3;
 /** One real camera's picture and map of one frame. */
 export interface CameraFrame {
   readonly camera: Camera;
+  /** As large as the header says, sides rounded up to even numbers. */
   readonly picture: Planes;
   /** Code values, of the picture's size or half of it, rounded up. */
   readonly map: Uint8Array;
 }
 
+interface Slot extends CameraFrame {
+  /** Its layer of `pixels` is ready. */
+  isPrepared: boolean;
+}
+
 export class CameraTextures {
-  readonly gl: WebGL2RenderingContext;
   readonly blocks: Texture;
   /** Blocks across and down a picture. */
   readonly grid: readonly [number, number];
+  readonly luma: ArrayTexture;
+  readonly chroma: ArrayTexture;
+  readonly maps: ArrayTexture;
+  /** Y, Cb, Cr and the map's code value of each pixel: what a fine picture is made of. */
+  readonly pixels: ArrayTexture;
+  readonly #gl: WebGL2RenderingContext;
   readonly #header: Header;
-  readonly #layers: WebGLTexture;
   readonly #prepare: Program;
   readonly #reduce: Program;
-  readonly #slots: (CameraFrame | undefined)[] = Array(SLOTS).fill(undefined);
+  readonly #slots: (Slot | undefined)[] = Array(SLOTS).fill(undefined);
   readonly #layerTarget: WebGLFramebuffer;
   readonly #blockTarget: WebGLFramebuffer;
-  readonly #map: Texture;
-  #luma: Texture | undefined;
-  #chroma: Texture | undefined;
-  #pairs = new Uint8Array();
+  readonly #pairs: Uint8Array;
+  /** What the blocks' bounds hold for; undefined: for none. */
+  #bounded: "draft" | "fine" | undefined;
 
   constructor(gl: WebGL2RenderingContext, header: Header) {
-    this.gl = gl;
+    this.#gl = gl;
     this.#header = header;
     const { width, height, mapScale } = header;
+    const [halfWidth, halfHeight] = [Math.ceil(width / 2), Math.ceil(height / 2)];
     this.grid = [Math.ceil(width / BLOCK), Math.ceil(height / BLOCK)];
     this.#prepare = makeProgram(gl, fullShader, prepareShader);
     this.#reduce = makeProgram(gl, fullShader, blocksShader);
-    this.#layers = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.#layers);
-    gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.RGBA8, width, height, SLOTS);
-    clampAndFilter(gl, gl.TEXTURE_2D_ARRAY);
+    this.luma = new ArrayTexture(gl, 1, 2 * halfWidth, 2 * halfHeight, SLOTS);
+    this.chroma = new ArrayTexture(gl, 2, halfWidth, halfHeight, SLOTS);
+    this.maps = new ArrayTexture(gl, 1, Math.ceil(width / mapScale), Math.ceil(height / mapScale), SLOTS);
+    this.pixels = new ArrayTexture(gl, 4, width, height, SLOTS);
+    this.#pairs = new Uint8Array(2 * halfWidth * halfHeight);
     this.#layerTarget = gl.createFramebuffer();
-    this.#map = new Texture(gl, 1, Math.ceil(width / mapScale), Math.ceil(height / mapScale));
     this.blocks = new Texture(gl, 2, this.grid[0], this.grid[1] * SLOTS);
     this.#blockTarget = framebufferOf(gl, this.blocks);
   }
 
-  bind(unit: number): void {
-    this.gl.activeTexture(this.gl.TEXTURE0 + unit);
-    this.gl.bindTexture(this.gl.TEXTURE_2D_ARRAY, this.#layers);
-  }
-
   /** Make these cameras ready, four at most; returns each one's layer. What is there already stays. */
-  place(frames: readonly CameraFrame[]): number[] {
-    const isThere = (frame: CameraFrame) => this.#slots.some((slot) => slot?.picture === frame.picture && slot.map === frame.map);
-    const missing = frames.filter((frame) => !isThere(frame));
-    for (const frame of missing) {
-      const slot = this.#slots.findIndex((one) => one === undefined || !frames.some((f) => f.picture === one.picture && f.map === one.map));
-      this.#slots[slot] = frame;
-      this.#upload(frame);
-      this.#draw(slot, frame.picture);
+  place(frames: readonly CameraFrame[], isFine: boolean): number[] {
+    const isOf = (frame: CameraFrame) => (slot: Slot | undefined) => slot?.picture === frame.picture && slot.map === frame.map;
+    for (const frame of frames) {
+      if (this.#slots.some(isOf(frame))) continue;
+      const layer = this.#slots.findIndex((slot) => slot === undefined || !frames.some((one) => isOf(one)(slot)));
+      this.#slots[layer] = { ...frame, isPrepared: false };
+      this.#upload(layer, frame);
+      this.#bounded = undefined;
     }
-    if (missing.length > 0) this.#reduceAll();
-    return frames.map((frame) => this.#slots.findIndex((slot) => slot?.picture === frame.picture && slot.map === frame.map));
+    const layers = frames.map((frame) => this.#slots.findIndex(isOf(frame)));
+    if (isFine) layers.forEach((layer) => this.#prepareLayer(layer));
+    const bounded = isFine ? "fine" : "draft";
+    if (this.#bounded !== bounded) this.#boundBlocks(isFine);
+    this.#bounded = bounded;
+    return layers;
   }
 
-  #upload({ picture, map }: CameraFrame): void {
-    const { gl } = this;
-    const [halfWidth, halfHeight] = [(picture.width + 1) >> 1, (picture.height + 1) >> 1];
-    if (this.#luma?.width !== picture.width || this.#luma.height !== picture.height) {
-      this.#luma?.delete();
-      this.#chroma?.delete();
-      this.#luma = new Texture(gl, 1, picture.width, picture.height);
-      this.#chroma = new Texture(gl, 2, halfWidth, halfHeight);
-      this.#pairs = new Uint8Array(2 * halfWidth * halfHeight);
-    }
+  #upload(layer: number, { picture, map }: CameraFrame): void {
     const { u, v } = picture;
     for (let i = 0; i < u.length; i++) {
       this.#pairs[2 * i] = u[i];
       this.#pairs[2 * i + 1] = v[i];
     }
-    this.#luma.upload(picture.y);
-    this.#chroma!.upload(this.#pairs);
-    this.#map.upload(map);
+    this.luma.upload(layer, picture.y);
+    this.chroma.upload(layer, this.#pairs);
+    this.maps.upload(layer, map);
   }
 
-  #draw(slot: number, picture: Planes): void {
-    const { gl } = this;
+  #prepareLayer(layer: number): void {
+    const slot = this.#slots[layer]!;
+    if (slot.isPrepared) return;
+    slot.isPrepared = true;
+    const gl = this.#gl;
     const { width, height, mapScale, range } = this.#header;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#layerTarget);
-    gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, this.#layers, 0, slot);
+    gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, this.pixels.texture, 0, layer);
     gl.viewport(0, 0, width, height);
-    this.#prepare.use();
-    this.#luma!.bind(0);
-    this.#chroma!.bind(1);
-    this.#map.bind(2);
-    gl.uniform1i(this.#prepare.at("uLuma"), 0);
-    gl.uniform1i(this.#prepare.at("uChroma"), 1);
-    gl.uniform1i(this.#prepare.at("uMap"), 2);
-    gl.uniform2i(this.#prepare.at("uSize"), width, height);
-    gl.uniform2f(this.#prepare.at("uChromaTexel"), 1 / ((picture.width + 1) >> 1), 1 / ((picture.height + 1) >> 1));
-    gl.uniform1i(this.#prepare.at("uHalfMap"), mapScale - 1);
-    gl.uniform1f(this.#prepare.at("uAgreement"), AGREEMENT_PX / (range[1] - range[0]));
+    const prepare = this.#prepare;
+    prepare.use();
+    prepare.textures({ uLuma: this.luma, uChroma: this.chroma, uMaps: this.maps });
+    gl.uniform1i(prepare.at("uCamera"), layer);
+    gl.uniform2i(prepare.at("uSize"), width, height);
+    gl.uniform2f(prepare.at("uChromaTexel"), 1 / this.chroma.width, 1 / this.chroma.height);
+    gl.uniform1i(prepare.at("uHalfMap"), mapScale - 1);
+    gl.uniform1f(prepare.at("uAgreement"), AGREEMENT_PX / (range[1] - range[0]));
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  #reduceAll(): void {
-    const { gl } = this;
+  #boundBlocks(isFine: boolean): void {
+    const gl = this.#gl;
+    const { mapScale } = this.#header;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#blockTarget);
     gl.viewport(0, 0, this.blocks.width, this.blocks.height);
-    this.#reduce.use();
-    this.bind(0);
-    gl.uniform1i(this.#reduce.at("uCameras"), 0);
-    gl.uniform2i(this.#reduce.at("uSize"), this.#header.width, this.#header.height);
-    gl.uniform1i(this.#reduce.at("uRows"), this.grid[1]);
+    const reduce = this.#reduce;
+    reduce.use();
+    reduce.textures({ uMaps: this.maps });
+    gl.uniform2i(reduce.at("uMapSize"), this.maps.width, this.maps.height);
+    gl.uniform1i(reduce.at("uSamples"), BLOCK / mapScale);
+    gl.uniform1i(reduce.at("uMargin"), isFine && mapScale > 1 ? 1 : 0); // enlarging looks at the samples around
+    gl.uniform1i(reduce.at("uRows"), this.grid[1]);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 }

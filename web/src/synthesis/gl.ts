@@ -34,6 +34,14 @@ export class Program {
     this.#gl.useProgram(this.#program);
   }
 
+  /** Bind textures for its samplers. */
+  textures(byName: Readonly<Record<string, Bindable>>): void {
+    Object.entries(byName).forEach(([name, texture], unit) => {
+      texture.bind(unit);
+      this.#gl.uniform1i(this.at(name), unit);
+    });
+  }
+
   at(name: string): WebGLUniformLocation | null {
     let place = this.#places.get(name);
     if (place === undefined) {
@@ -44,29 +52,56 @@ export class Program {
   }
 }
 
-/** A texture of one size and format for good; filtered between its pixels, not repeated. */
-export class Texture {
+export interface Bindable {
+  bind(unit: number): void;
+}
+
+/** Several textures of one size in one, a layer each; filtered between pixels, not between layers. */
+export class ArrayTexture implements Bindable {
   readonly texture: WebGLTexture;
   readonly width: number;
   readonly height: number;
   readonly #gl: WebGL2RenderingContext;
   readonly #format: number;
 
-  constructor(gl: WebGL2RenderingContext, channels: 1 | 2 | 4, width: number, height: number) {
+  constructor(gl: WebGL2RenderingContext, channels: Channels, width: number, height: number, layers: number) {
     this.#gl = gl;
     [this.width, this.height] = [width, height];
     this.texture = gl.createTexture();
-    this.#format = { 1: gl.RED, 2: gl.RG, 4: gl.RGBA }[channels];
-    gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, { 1: gl.R8, 2: gl.RG8, 4: gl.RGBA8 }[channels], width, height);
-    clampAndFilter(gl, gl.TEXTURE_2D);
+    const { format, stored } = formatOf(gl, channels);
+    this.#format = format;
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.texture);
+    gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, stored, width, height, layers);
+    clampAndFilter(gl, gl.TEXTURE_2D_ARRAY);
   }
 
-  upload(pixels: Uint8Array): void {
+  upload(layer: number, pixels: Uint8Array): void {
     const gl = this.#gl;
-    gl.bindTexture(gl.TEXTURE_2D, this.texture);
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.texture);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, this.width, this.height, this.#format, gl.UNSIGNED_BYTE, pixels);
+    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, this.width, this.height, 1, this.#format, gl.UNSIGNED_BYTE, pixels);
+  }
+
+  bind(unit: number): void {
+    this.#gl.activeTexture(this.#gl.TEXTURE0 + unit);
+    this.#gl.bindTexture(this.#gl.TEXTURE_2D_ARRAY, this.texture);
+  }
+}
+
+/** A texture of one size and format for good; filtered between its pixels, not repeated. */
+export class Texture implements Bindable {
+  readonly texture: WebGLTexture;
+  readonly width: number;
+  readonly height: number;
+  readonly #gl: WebGL2RenderingContext;
+
+  constructor(gl: WebGL2RenderingContext, channels: Channels, width: number, height: number) {
+    this.#gl = gl;
+    [this.width, this.height] = [width, height];
+    this.texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, this.texture);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, formatOf(gl, channels).stored, width, height);
+    clampAndFilter(gl, gl.TEXTURE_2D);
   }
 
   bind(unit: number): void {
@@ -79,7 +114,20 @@ export class Texture {
   }
 }
 
-export function clampAndFilter(gl: WebGL2RenderingContext, target: number): void {
+type Channels = 1 | 2 | 4;
+
+function formatOf(gl: WebGL2RenderingContext, channels: Channels): { format: number; stored: number } {
+  switch (channels) {
+    case 1:
+      return { format: gl.RED, stored: gl.R8 };
+    case 2:
+      return { format: gl.RG, stored: gl.RG8 };
+    case 4:
+      return { format: gl.RGBA, stored: gl.RGBA8 };
+  }
+}
+
+function clampAndFilter(gl: WebGL2RenderingContext, target: number): void {
   for (const axis of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(target, axis, gl.CLAMP_TO_EDGE);
   for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(target, filter, gl.LINEAR);
 }

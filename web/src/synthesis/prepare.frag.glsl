@@ -2,11 +2,12 @@
 // A real camera's decoded planes -> one texel a pixel: Y, Cb, Cr and the map's code value.
 precision highp float;
 precision highp int;
-precision highp sampler2D;
+precision highp sampler2DArray;
 
-uniform sampler2D uLuma;
-uniform sampler2D uChroma;   // Cb, Cr; filtered linearly
-uniform sampler2D uMap;      // code values, of the picture's size or half of it
+uniform sampler2DArray uLuma;
+uniform sampler2DArray uChroma; // Cb, Cr; filtered linearly
+uniform sampler2DArray uMaps;   // code values, of the picture's size or half of it
+uniform int uCamera;
 uniform ivec2 uSize;         // of the picture, px
 uniform vec2 uChromaTexel;   // 1 / size of the chroma plane
 uniform bool uHalfMap;
@@ -18,11 +19,11 @@ const float COLOUR_STEP = 40.0 / 255.0; // counts as much as one sample of dista
 
 // Chroma stands on the even columns, midway between rows 2j and 2j + 1.
 vec2 chromaAt(vec2 pixel) {
-    return texture(uChroma, vec2(pixel.x * 0.5 + 0.5, pixel.y * 0.5 + 0.25) * uChromaTexel).rg;
+    return texture(uChroma, vec3(vec2(pixel.x * 0.5 + 0.5, pixel.y * 0.5 + 0.25) * uChromaTexel, uCamera)).rg;
 }
 
 float lumaAt(ivec2 pixel) {
-    return texelFetch(uLuma, clamp(pixel, ivec2(0), uSize - 1), 0).r;
+    return texelFetch(uLuma, ivec3(clamp(pixel, ivec2(0), uSize - 1), uCamera), 0).r;
 }
 
 vec3 rgb(vec3 yuv) {
@@ -38,7 +39,7 @@ vec3 meanAt(ivec2 at) {
 }
 
 float mapAt(ivec2 at, ivec2 size) {
-    return texelFetch(uMap, clamp(at, ivec2(0), size - 1), 0).r;
+    return texelFetch(uMaps, ivec3(clamp(at, ivec2(0), size - 1), uCamera), 0).r;
 }
 
 // Of the nearest 3 x 3 samples the surface of the one whose colour and place are most like the pixel's own.
@@ -83,12 +84,15 @@ float enlarged(ivec2 pixel, vec3 yuv) {
     if (max(max(a, b), max(c, d)) - min(min(a, b), min(c, d)) <= uAgreement) {
         return mix(mix(a, b, part.x), mix(c, d, part.x), part.y);
     }
-    return alongEdge(pixel, size, rgb(yuv));
+    float found = 0.0;
+    // A loop of one turn: GPUs in software jump over those alone.
+    for (int once = 0; once < 1; once++) found = alongEdge(pixel, size, rgb(yuv));
+    return found;
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec3 yuv = vec3(lumaAt(pixel), chromaAt(vec2(pixel)));
-    float code = uHalfMap ? enlarged(pixel, yuv) : texelFetch(uMap, pixel, 0).r;
+    float code = uHalfMap ? enlarged(pixel, yuv) : texelFetch(uMaps, ivec3(pixel, uCamera), 0).r;
     oPixel = vec4(yuv, code);
 }

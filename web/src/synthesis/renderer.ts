@@ -4,9 +4,12 @@ import type { Header } from "../container/header.ts";
 import { contributors, infinityOf, type Viewpoint } from "../geometry.ts";
 import boundsFragment from "./bounds.frag.glsl";
 import boundsVertex from "./bounds.vert.glsl";
-import { CameraTextures, SLOTS, type CameraFrame } from "./camera_textures.ts";
+import { BLOCK, CameraTextures, SLOTS, type CameraFrame } from "./camera_textures.ts";
+import draftFragment from "./draft.frag.glsl";
 import fullVertex from "./full.vert.glsl";
+import geometryFragment from "./geometry.frag.glsl";
 import { framebufferOf, makeProgram, Texture, type Program } from "./gl.ts";
+import searchShader from "./search.glsl";
 import viewFragment from "./view.frag.glsl";
 
 /** What a view shows, in the order of `view.frag.glsl`. */
@@ -18,7 +21,7 @@ export interface ViewSettings {
   readonly look: Look;
   /** Disparity in 16 bits in place of the look. */
   readonly raw?: boolean;
-  /** Cubic fetch; else linear, which is quicker. */
+  /** Cubic fetch and soft contours; else quick: a draft of the picture, and other looks by linear fetch. */
   readonly fine: boolean;
   /** How far the view stands ahead of the cameras' plane: 1 / the disparity of what it would touch, px from infinity. */
   readonly dolly: number;
@@ -39,6 +42,13 @@ export interface Pixels {
   readonly data: Uint8Array;
 }
 
+/** What of the cameras and the view the passes must know, by slot. */
+interface Seen {
+  readonly shifts: Float32Array;
+  readonly weights: Float32Array;
+  readonly dolly: number;
+}
+
 /** Part of a target: where a view is drawn, px from the lower left. */
 export interface Area {
   readonly x: number;
@@ -56,6 +66,10 @@ export class ViewRenderer {
   readonly #near: Texture;
   readonly #far: Texture;
   readonly #boundsTarget: WebGLFramebuffer;
+  readonly #geometry: Program;
+  readonly #draft: Program;
+  readonly #surface: Texture;
+  readonly #geometryTarget: WebGLFramebuffer;
 
   /** Throws Error where there is no WebGL 2. */
   constructor(canvas: HTMLCanvasElement | OffscreenCanvas, header: Header) {
@@ -69,7 +83,12 @@ export class ViewRenderer {
     this.#far = new Texture(this.gl, 4, across, down);
     this.#boundsTarget = framebufferOf(this.gl, this.#near, this.#far);
     this.#bounds = makeProgram(this.gl, boundsVertex, boundsFragment);
-    this.#view = makeProgram(this.gl, fullVertex, viewFragment);
+    this.#view = makeProgram(this.gl, fullVertex, searchShader + viewFragment);
+    const { width, height } = this.#cameras.chroma;
+    this.#surface = new Texture(this.gl, 4, width, height);
+    this.#geometryTarget = framebufferOf(this.gl, this.#surface);
+    this.#geometry = makeProgram(this.gl, fullVertex, searchShader + geometryFragment);
+    this.#draft = makeProgram(this.gl, fullVertex, draftFragment);
   }
 
   /**
@@ -82,15 +101,16 @@ export class ViewRenderer {
     const seeing = contributors(this.#header, view, ({ row, col }) => frames.some((frame) => at(frame, row, col)));
     const own = seeing.find(({ camera }) => camera.row === view.row && camera.col === view.col);
     const used = own === undefined || settings.dolly !== 0 ? seeing : [own];
-    const layers = this.#cameras.place(used.map(({ camera }) => frames.find((frame) => at(frame, camera.row, camera.col))!));
-    const shifts = new Float32Array(2 * SLOTS);
-    const weights = new Float32Array(SLOTS);
+    const isDraft = !settings.fine && settings.look === "picture" && !settings.raw;
+    const layers = this.#cameras.place(used.map(({ camera }) => frames.find((frame) => at(frame, camera.row, camera.col))!), !isDraft);
+    const seen = { shifts: new Float32Array(2 * SLOTS), weights: new Float32Array(SLOTS), dolly: settings.dolly };
     used.forEach(({ shift, weight }, i) => {
-      shifts.set(shift, 2 * layers[i]);
-      weights[layers[i]] = weight;
+      seen.shifts.set(shift, 2 * layers[i]);
+      seen.weights[layers[i]] = weight;
     });
-    this.#drawBounds(shifts, weights, settings);
-    this.#drawView(shifts, weights, settings, area, target);
+    this.#drawBounds(seen);
+    if (isDraft) this.#drawDraft(seen, settings, area, target);
+    else this.#drawView(seen, settings, area, target);
   }
 
   /** Disparity of one pixel of a view, px, and whether any camera sees it. */
@@ -123,7 +143,7 @@ export class ViewRenderer {
     return { width, height, data };
   }
 
-  #drawBounds(shifts: Float32Array, weights: Float32Array, settings: ViewSettings): void {
+  #drawBounds(seen: Seen): void {
     const { gl } = this;
     const [across, down] = this.#cameras.grid;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#boundsTarget);
@@ -133,35 +153,62 @@ export class ViewRenderer {
     gl.enable(gl.BLEND);
     gl.blendEquation(gl.MAX);
     this.#bounds.use();
-    this.#cameras.blocks.bind(0);
-    gl.uniform1i(this.#bounds.at("uBlocks"), 0);
+    this.#bounds.textures({ uBlocks: this.#cameras.blocks });
     gl.uniform2i(this.#bounds.at("uGrid"), across, down);
-    this.#describe(this.#bounds, shifts, weights, settings);
+    this.#describe(this.#bounds, seen, 1);
     gl.drawArrays(gl.POINTS, 0, across * down * SLOTS);
     gl.disable(gl.BLEND);
   }
 
-  #drawView(shifts: Float32Array, weights: Float32Array, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
+  /** Surfaces at half size, then each pixel's brightness. */
+  #drawDraft(seen: Seen, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
+    const { gl } = this;
+    const { luma, chroma, maps } = this.#cameras;
+    const { width, height } = this.#surface;
+    const geometry = this.#geometry;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#geometryTarget);
+    gl.viewport(0, 0, width, height);
+    geometry.use();
+    geometry.textures({ uMaps: maps, uChroma: chroma, uNear: this.#near, uFar: this.#far });
+    this.#describe(geometry, seen, 0.5);
+    gl.uniform1f(geometry.at("uTile"), BLOCK / 2);
+    gl.uniform2i(geometry.at("uSize"), width, height);
+    gl.uniform1i(geometry.at("uMapStep"), 2 / this.#header.mapScale);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+
+    const draft = this.#draft;
+    draft.use();
+    draft.textures({ uSurface: this.#surface, uLuma: luma });
+    this.#describe(draft, seen, 1);
+    gl.uniform2i(draft.at("uSize"), this.#header.width, this.#header.height);
+    gl.uniform2i(draft.at("uHalfSize"), width, height);
+    gl.uniform2f(draft.at("uLumaTexel"), 1 / luma.width, 1 / luma.height);
+    this.#drawArea(draft, settings, area, target);
+  }
+
+  #drawView(seen: Seen, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
     const { gl } = this;
     const view = this.#view;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
-    gl.viewport(area.x, area.y, area.width, area.height);
     view.use();
-    this.#cameras.bind(0);
-    this.#near.bind(1);
-    this.#far.bind(2);
-    gl.uniform1i(view.at("uCameras"), 0);
-    gl.uniform1i(view.at("uNear"), 1);
-    gl.uniform1i(view.at("uFar"), 2);
-    this.#describe(view, shifts, weights, settings);
+    view.textures({ uCameras: this.#cameras.pixels, uNear: this.#near, uFar: this.#far });
+    this.#describe(view, seen, 1);
+    gl.uniform1f(view.at("uTile"), BLOCK);
     gl.uniform2i(view.at("uSize"), this.#header.width, this.#header.height);
-    gl.uniform4f(view.at("uArea"), area.x, area.y, area.width, area.height);
-    gl.uniform1i(view.at("uFromTop"), target === null ? 0 : 1);
-    gl.uniform2f(view.at("uOffset"), ...(settings.offset ?? [0, 0]));
     gl.uniform1f(view.at("uWipe"), settings.wipe ?? 0);
     gl.uniform1i(view.at("uLook"), settings.raw ? RAW : LOOKS.indexOf(settings.look));
     gl.uniform1i(view.at("uFine"), settings.fine ? 1 : 0);
-    gl.uniform1i(view.at("uSoftens"), weights.filter((weight) => weight > 0).length > 1 ? 1 : 0);
+    gl.uniform1i(view.at("uSoftens"), seen.weights.filter((weight) => weight > 0).length > 1 ? 1 : 0);
+    this.#drawArea(view, settings, area, target);
+  }
+
+  /** The last pass of a view. */
+  #drawArea(program: Program, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+    gl.viewport(area.x, area.y, area.width, area.height);
+    gl.uniform4f(program.at("uArea"), area.x, area.y, area.width, area.height);
+    gl.uniform1i(program.at("uFromTop"), target === null ? 0 : 1);
+    gl.uniform2f(program.at("uOffset"), ...(settings.offset ?? [0, 0]));
     const [red, green, blue] = settings.mask ?? [true, true, true];
     gl.colorMask(red, green, blue, true);
     if (settings.share !== undefined) {
@@ -175,14 +222,15 @@ export class ViewRenderer {
     gl.colorMask(true, true, true, true);
   }
 
-  /** What both passes must know of the cameras and the view. */
-  #describe(program: Program, shifts: Float32Array, weights: Float32Array, settings: ViewSettings): void {
+  /** What all passes must know of the cameras and the view; `scale`: samples of the pass across a px. */
+  #describe(program: Program, { shifts, weights, dolly }: Seen, scale: number): void {
     const { gl } = this;
     const { width, height, range } = this.#header;
-    gl.uniform2fv(program.at("uShift"), shifts);
+    gl.uniform2fv(program.at("uShift"), shifts.map((shift) => scale * shift));
     gl.uniform4fv(program.at("uWeight"), weights);
     gl.uniform2f(program.at("uRange"), ...range);
-    gl.uniform3f(program.at("uDolly"), settings.dolly, (width - 1) / 2, (height - 1) / 2);
+    // Sample 0 is the middle of the first pixels that it stands for.
+    gl.uniform3f(program.at("uDolly"), dolly, (scale * width - 1) / 2, (scale * height - 1) / 2);
     gl.uniform1f(program.at("uInfinity"), infinityOf(this.#header));
   }
 }

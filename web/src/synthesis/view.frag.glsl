@@ -1,19 +1,7 @@
-#version 300 es
 // A view: where its surfaces are, by the vote of the cell's cameras, and what the cameras that see them show there.
-precision highp float;
-precision highp int;
-precision highp sampler2D;
-precision highp sampler2DArray;
+// Goes behind search.glsl. What few pixels need stands in loops of one turn: GPUs in software jump over those alone.
 
 uniform sampler2DArray uCameras; // Y, Cb, Cr, code value
-uniform sampler2D uNear;         // per tile, in each camera's channel: the largest code value; 0: none
-uniform sampler2D uFar;          // likewise 1 - the smallest
-uniform vec2 uShift[4];          // px from the view to the camera for each px of disparity
-uniform vec4 uWeight;            // 0: this camera does not count
-uniform vec2 uRange;             // px that the code values 0 and 1 mean
-uniform vec3 uDolly;             // how far ahead of the cameras' plane the view stands, 1 / px; the place it moves to, px
-uniform float uInfinity;         // disparity of infinitely distant points, px
-uniform ivec2 uSize;             // of the picture, px
 uniform vec4 uArea;              // x, y, width, height of what is drawn
 uniform bool uFromTop;           // the first row drawn is the picture's first
 uniform vec2 uOffset;            // px that the picture is moved by
@@ -24,17 +12,11 @@ uniform bool uSoftens;           // more than one camera: a real camera's own co
 
 out vec4 oColour;
 
-const float TILE = 8.0;
-const float UNKNOWN = -1e9;
-const float REACH = 0.54;       // px around its place that a moved pixel covers
-const float TOLERANCE = 1.5;    // px within which disparities are one surface
-const float RATIO = 1.3;        // by which farther cameras must outweigh nearer ones
-const float SHARPNESS = -0.7;   // Keys' parameter of the cubic fetch
+const float SHARPNESS = -0.7;    // Keys' parameter of the cubic fetch
 const float NEIGHBOUR = 0.8;     // how much a neighbour's surface counts at a contour
 const float STRAY = 0.1;         // how much a pixel counts that none of its neighbours is like
-const int MOST_STEPS = 256;
-const int FILL_REACH = 24;      // px that a gap is looked over for its ends
-const int PAINT_REACH = 32;     // px that holes are painted from
+const int FILL_REACH = 24;       // px that a gap is looked over for its ends
+const int PAINT_REACH = 32;      // px that holes are painted from
 
 const int DISPARITY = 1;
 const int LAYERS = 2;
@@ -42,66 +24,15 @@ const int PROVENANCE = 3;
 const int DISAGREEMENT = 4;
 const int RAW = 5;              // disparity in 16 bits, for programs
 
-float px(float code) {
-    return mix(uRange.x, uRange.y, code);
+float codeAt(int camera, ivec2 pixel) {
+    return texelFetch(uCameras, ivec3(pixel, camera), 0).a;
 }
 
-bool isInside(ivec2 pixel) {
-    return all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, uSize));
-}
-
-// Where a camera sees the view's point `at` at disparity d.
-vec2 placeOf(int camera, vec2 at, float d) {
-    return at + uShift[camera] * d - uDolly.x * (d - uInfinity) * (at - uDolly.yz);
-}
-
-// Disparity of a camera's pixel where it is seen at `at` in the view, else UNKNOWN; `surface`: what the pixel has.
-float seenThere(int camera, vec2 at, float d, out float surface) {
-    ivec2 pixel = ivec2(floor(placeOf(camera, at, d) + 0.5));
-    surface = d;
-    if (!isInside(pixel)) return UNKNOWN;
-    surface = px(texelFetch(uCameras, ivec3(pixel, camera), 0).a);
-    vec2 miss = abs(placeOf(camera, at, surface) - vec2(pixel));
-    return max(miss.x, miss.y) <= REACH ? surface : UNKNOWN;
-}
-
-// The nearest surface that a camera has at a place of the view, between two bounds, near to far.
-float search(int camera, vec2 at, float near, float far) {
-    vec2 way = abs(placeOf(camera, at, near) - placeOf(camera, at, far));
-    float travel = max(way.x, way.y);
-    float surface;
-    if (travel <= 1.0) {
-        float found = seenThere(camera, at, 0.5 * (near + far), surface);
-        return found > UNKNOWN ? found : seenThere(camera, at, surface, surface);
-    }
-    int steps = min(int(ceil(travel)), MOST_STEPS);
-    float stride = (near - far) / float(steps);
-    for (int k = 0; k <= steps; k++) {
-        float d = near - float(k) * stride;
-        float found = seenThere(camera, at, d, surface);
-        // Between two steps both axes may round differently: the surface's own place decides.
-        if (found == UNKNOWN && abs(d - surface) < stride) found = seenThere(camera, at, surface, surface);
-        if (found > UNKNOWN) return found;
-    }
-    return UNKNOWN;
-}
-
-// Surfaces are tried near to far; a farther one wins where its cameras weigh RATIO times the winner so far.
-float vote(vec4 found) {
-    float best = UNKNOWN;
-    float strength = 0.0;
-    for (int group = 0; group < 4; group++) {
-        float nearest = max(max(found.x, found.y), max(found.z, found.w));
-        if (nearest == UNKNOWN) break;
-        vec4 member = vec4(greaterThanEqual(found, vec4(nearest - TOLERANCE))) * uWeight;
-        float total = dot(member, vec4(1.0));
-        if (group == 0 || total > RATIO * strength) {
-            best = dot(member, found) / total;
-            strength = total;
-        }
-        found = mix(found, vec4(UNKNOWN), greaterThan(member, vec4(0.0)));
-    }
-    return best;
+float surfaceAt(vec2 at) {
+    vec4 found;
+    float background;
+    bool isEdge;
+    return surfaceAt(at, found, background, isEdge);
 }
 
 vec4 cubicWeights(float t) {
@@ -166,33 +97,9 @@ vec4 fetch(int camera, vec2 at, float d) {
     return vec4(edge.rgb, 0.5 * edge.w);
 }
 
-vec3 rgb(vec3 yuv) {
-    vec3 c = (yuv * 255.0 - vec3(16.0, 128.0, 128.0)) / vec3(219.0, 224.0, 224.0);
-    return vec3(c.x + 1.5748 * c.z, c.x - 0.18732 * c.y - 0.46812 * c.z, c.x + 1.8556 * c.y);
-}
-
 // Far is blue, near is yellow.
 vec3 ramp(float t) {
     return mix(mix(vec3(0.05, 0.07, 0.35), vec3(0.75, 0.2, 0.45), min(2.0 * t, 1.0)), vec3(1.0, 0.95, 0.4), max(2.0 * t - 1.0, 0.0));
-}
-
-// Disparity of the view at a place, by all cameras, or UNKNOWN; `background`: the farthest that may be there.
-float surfaceAt(vec2 at, out float background, out bool isEdge) {
-    ivec2 tile = ivec2(clamp(at, vec2(0.0), vec2(uSize - 1)) / TILE);
-    vec4 near = texelFetch(uNear, tile, 0);
-    vec4 far = 1.0 - texelFetch(uFar, tile, 0);
-    vec4 found = vec4(UNKNOWN);
-    background = uRange.y;
-    float foreground = uRange.x;
-    for (int i = 0; i < 4; i++) {
-        if (near[i] == 0.0) continue;
-        foreground = max(foreground, px(near[i]));
-        background = min(background, px(far[i]));
-        found[i] = search(i, at, px(near[i]), px(far[i]));
-    }
-    background = min(background, foreground);
-    isEdge = foreground - background > TOLERANCE;
-    return vote(found);
 }
 
 // What no camera knows lies behind what is beside it: the farther one of both ends of the gap on the row.
@@ -202,9 +109,7 @@ float fill(vec2 at, float background) {
         for (int k = 1; k <= FILL_REACH; k++) {
             vec2 there = at + vec2(side * k, 0);
             if (there.x < -0.5 || there.x > float(uSize.x) - 0.5) break;
-            float ignored;
-            bool isEdge;
-            float d = surfaceAt(there, ignored, isEdge);
+            float d = surfaceAt(there);
             if (d == UNKNOWN) continue;
             farther = min(farther, d);
             break;
@@ -242,9 +147,7 @@ vec3 paint(vec2 at) {
         for (int k = 1; k <= PAINT_REACH; k++) {
             vec2 there = at + vec2(side * k, 0);
             if (there.x < -0.5 || there.x > float(uSize.x) - 0.5) break;
-            float ignored;
-            bool isEdge;
-            float d = surfaceAt(there, ignored, isEdge);
+            float d = surfaceAt(there);
             if (d == UNKNOWN) continue;
             int seen;
             float squares;
@@ -267,9 +170,7 @@ vec3 soften(vec2 at, float d, vec3 own) {
     int alike = 0;
     for (int k = 0; k < 4; k++) {
         vec2 there = at + vec2(k == 0 ? 1 : k == 1 ? -1 : 0, k == 2 ? 1 : k == 3 ? -1 : 0);
-        float background;
-        bool isEdge;
-        float other = surfaceAt(there, background, isEdge);
+        float other = surfaceAt(there);
         if (other == UNKNOWN) continue;
         if (abs(other - d) <= TOLERANCE) {
             alike++;
@@ -287,15 +188,17 @@ vec3 soften(vec2 at, float d, vec3 own) {
 void main() {
     vec2 drawn = (gl_FragCoord.xy - uArea.xy) / uArea.zw;
     vec2 at = vec2(drawn.x, uFromTop ? drawn.y : 1.0 - drawn.y) * vec2(uSize) - 0.5 + uOffset;
+    vec4 found;
     float background;
     bool isEdge;
-    float d = surfaceAt(at, background, isEdge);
+    float d = surfaceAt(at, found, background, isEdge);
     if (d == UNKNOWN) d = fill(at, background);
     int seen;
     float squares;
     vec4 sum = blend(at, d, seen, squares);
     vec3 yuv = seen > 0 ? sum.rgb : paint(at);
-    if (uFine && isEdge && uSoftens) yuv = soften(at, d, yuv);
+    bool softens = uFine && isEdge && uSoftens;
+    for (int once = 0; once < int(softens); once++) yuv = soften(at, d, yuv);
     float t = (d - uRange.x) / (uRange.y - uRange.x);
     vec3 colour = rgb(yuv);
     int look = drawn.x < uWipe ? 0 : uLook;
