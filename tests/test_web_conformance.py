@@ -19,6 +19,7 @@ pytest_plugins = ("web_fixtures",)
 
 FOLDER = Path(__file__).parent / "conformance"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.mcap"))
+NEEDS_REFERENCES = ("/predicted", "/enhanced")
 
 READ = """async (name) => {
     const { FileDecoder } = await import("./player.js");
@@ -85,12 +86,9 @@ def test_every_pair_is_read_as_it_says(tab: Page, site: Site, name: str) -> None
         sums = {
             topic: checksums(planes, expected["header"], topic) for topic, planes in got["planes"].items()
         }
-<<<<<<< HEAD
-        base = {topic: sums for topic, sums in frame["crc32"].items() if not topic.endswith("/enhanced")}
-        assert sums == base  # the page shows a file with an enhancement layer as if it had none
-=======
-        # No browser can be given a reference picture, which predicted cameras need.
-        assert sums == {topic: crc for topic, crc in frame["crc32"].items() if not topic.endswith("/predicted")}
+        # No browser can be given a reference picture, which predicted cameras and enhanced views need.
+        base = {topic: crc for topic, crc in frame["crc32"].items() if not topic.endswith(NEEDS_REFERENCES)}
+        assert sums == base
 
 
 def test_of_predicted_cameras_those_that_play_alone_are_shown_and_it_says_so(tab: Page, site: Site) -> None:
@@ -111,4 +109,3 @@ def test_without_maps_the_nearest_camera_is_shown_and_it_says_so(tab: Page, site
     shown = tab.evaluate("document.querySelector('mvcodec-player').shown")
     assert shown["view"]["row"] in header["real_rows"]
     assert shown["view"]["col"] in header["real_cols"]
->>>>>>> d3c3b4e (The page says which cameras it cannot decode, and shows those that play alone: files with predicted cameras and without maps)
