@@ -24,6 +24,11 @@ DISPARITY_CAMERAS = ("all", "alternate", "none")
 so that the decoder estimates all maps from the decoded pictures."""
 
 
+DISPARITY_USES = ("all", "prediction")
+"""What maps that are sent are for: for all, or for predicting pictures alone, so that the decoder estimates
+what it renders with."""
+
+
 class TrackKind(StrEnum):
     """What a track carries."""
 
@@ -115,6 +120,7 @@ class StreamHeader:
         disparity_scale: 1 or 2: the maps are coded at the pictures' size, or at half of it each way.
         disparity_cameras: one of DISPARITY_CAMERAS.
         predicted: the real cameras that are predicted from others, in the order of decoding.
+        disparity_use: one of DISPARITY_USES.
     """
 
     array: CameraArray
@@ -125,6 +131,7 @@ class StreamHeader:
     disparity_scale: int = 1
     disparity_cameras: str = "all"
     predicted: tuple[PredictedCamera, ...] = ()
+    disparity_use: str = "all"
 
     def __post_init__(self) -> None:
         low, high = self.disparity_range_px
@@ -135,6 +142,10 @@ class StreamHeader:
             raise SettingError("disparity_scale", self.disparity_scale, expected)
         if self.disparity_cameras not in DISPARITY_CAMERAS:
             raise SettingError("disparity_cameras", self.disparity_cameras, " or ".join(DISPARITY_CAMERAS))
+        if self.disparity_use not in DISPARITY_USES:
+            raise SettingError("disparity_use", self.disparity_use, " or ".join(DISPARITY_USES))
+        if self.disparity_use == "prediction" and not self.map_cameras:
+            raise SettingError("disparity_use", self.disparity_use, "all where no camera sends a map")
         self._check_predicted()
 
     def _check_predicted(self) -> None:
@@ -153,7 +164,12 @@ class StreamHeader:
     @property
     def version(self) -> int:
         """The lowest format version that can say this."""
-        return 2 if self.disparity_cameras == "none" or self.predicted else 1
+        return 2 if self.estimates_maps or self.predicted else 1
+
+    @property
+    def estimates_maps(self) -> bool:
+        """Whether the decoder estimates the maps that it renders with."""
+        return self.disparity_cameras == "none" or self.disparity_use == "prediction"
 
     @property
     def tracks(self) -> tuple[Track, ...]:
@@ -211,6 +227,8 @@ class StreamHeader:
             "first_frame": self.first_frame,
             "settings": dict(self.settings),
         }
+        if self.disparity_use != "all":
+            document["disparity_use"] = self.disparity_use
         if self.predicted:
             cameras = [{"camera": each.camera, "from": each.references} for each in self.predicted]
             document["prediction"] = {"predictor": PREDICTOR, "codec": REFERENCE_CODEC, "cameras": cameras}
@@ -238,7 +256,8 @@ class StreamHeader:
         except SettingError as error:
             raise StreamError(source, f"a damaged header ({error})", "the fields of FORMAT.md") from None
         if header.version > version:
-            what = "predicted cameras" if header.predicted else "disparity_cameras none"
+            no_maps = "disparity_cameras none" if not header.map_cameras else "disparity_use prediction"
+            what = "predicted cameras" if header.predicted else no_maps
             found = f"{what} in a header of version {version}"
             raise StreamError(source, found, f"version {header.version}")
         return header
@@ -254,6 +273,7 @@ class StreamHeader:
             disparity_scale=fields.integer("disparity_scale", 1, DISPARITY_SCALES[-1], 1),
             disparity_cameras=fields.text("disparity_cameras", "all"),
             predicted=_predicted(fields.inner("prediction")) if "prediction" in fields else (),
+            disparity_use=fields.text("disparity_use", "all"),
         )
 
 

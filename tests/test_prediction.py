@@ -213,10 +213,44 @@ def test_recover_leaves_out_what_cannot_be_predicted(tmp_path: Path) -> None:
 
 
 def test_settings_that_do_not_go_together_are_told() -> None:
-    with pytest.raises(SettingError, match="disparity_cameras: found none, expected maps"):
-        EncoderConfig(disparity_cameras="none", prediction="synthesis")
     with pytest.raises(SettingError, match="prediction: found synthesis with a bit rate"):
         EncoderConfig(bitrate_kbps=500, prediction="synthesis")
+
+
+def test_without_maps_some_are_sent_for_prediction_alone_and_decoders_estimate(tmp_path: Path) -> None:
+    """The pictures are predicted as ever; what is rendered with comes from a matcher."""
+    few = predicted_file(disparity_cameras="alternate", qp=24)
+    file = predicted_file(disparity_cameras="none", qp=24)
+    with Decoder.open(io.BytesIO(file), matcher=RampMatcher()) as decoder:
+        found = list(decoder)
+        header = decoder.header
+    assert (header.version, header.disparity_use) == (2, "prediction")
+    assert header.map_cameras == ((0, 0), (1, 1))
+    for one, other in zip(decoded_sets(few), found, strict=True):
+        assert not np.array_equal(one.disparities[0, 0].values_px, other.disparities[0, 0].values_px)
+        np.testing.assert_array_equal(
+            other.disparities[0, 0].values_px,
+            RampMatcher().match(make_array(), other.pictures, RANGE_PX)[0, 0].values_px,
+        )
+    path = tmp_path / "x.mcap"
+    path.write_bytes(file)
+    assert validate(path) == []
+    assert "maps of 2 cameras for prediction alone: decoders estimate 4" in succeeds("info", path)
+
+
+def test_a_use_of_maps_that_cannot_be_is_refused() -> None:
+    document = json.loads(encode(make_array(), 1, **FORM, disparity_cameras="none")[0][0].data)
+    for change, message in (
+        ({"disparity_use": "some"}, "disparity_use: found some, expected all or prediction"),
+        ({"disparity_cameras": "none", "prediction": None}, "disparity_use: found prediction, expected all"),
+    ):
+        wrong = {name: value for name, value in {**document, **change}.items() if value is not None}
+        with pytest.raises(StreamError) as caught:
+            StreamHeader.from_json(json.dumps(wrong).encode())
+        assert message in str(caught.value)
+    del document["prediction"]
+    with pytest.raises(StreamError, match="found disparity_use prediction in a header of version 1"):
+        StreamHeader.from_json(json.dumps(document | {"version": 1}).encode())
 
 
 @pytest.mark.parametrize("count", [1, 3])

@@ -4,10 +4,11 @@
                                [--frames A:B] [--json]
 
 Forms: `plain` (what encode writes by default), `none` (no maps in the file), `synthesis` (real cameras
-coded from each other), `synthesis-alternate` (and maps from every second one, whatever the array); each of
-them with `+N` behind it has an enhancement layer whose QP is N more than the pictures'. All views of the
-input's grid are rendered and compared, the container counts. The last lines are BD-rates against the first
-form, of each other form and of the hull of all but the first.
+coded from each other), `synthesis-alternate` (and maps from every second one, whatever the array),
+`synthesis-none` (maps for prediction alone, decoders estimate their own); each of them with `+N` behind it
+has an enhancement layer whose QP is N more than the pictures'. All views of the input's grid are rendered and
+compared, the container counts. The last lines are BD-rates against the first form, of each other form and of
+the hull of all but the first.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ FORMS: Mapping[str, Mapping[str, str]] = {
     "plain": {},
     "none": {"disparity_cameras": "none"},
     "synthesis": {"prediction": "synthesis"},
+    "synthesis-none": {"prediction": "synthesis", "disparity_cameras": "none"},
     "synthesis-alternate": {"prediction": "synthesis", "disparity_cameras": "alternate"},
 }
 QPS = "22,27,32,37,42"

@@ -243,7 +243,7 @@ def check_matcher(matcher: str | None, header: StreamHeader) -> None:
     Raises:
         SettingError: it is given, and the file holds maps.
     """
-    if matcher is not None and header.map_cameras:
+    if matcher is not None and not header.estimates_maps:
         raise SettingError("--matcher", matcher, "no such option: the file holds maps")
 
 

@@ -83,9 +83,12 @@ def _recorded(info: StreamInfo) -> str:
 
 
 def _maps(header: StreamHeader) -> str:
+    matcher = header.settings.get("matcher", DEFAULT_MATCHER)
+    estimating = f"decoders estimate {len(header.array.real)} a frame set, by matcher {matcher}"
     if not header.map_cameras:
-        matcher = header.settings.get("matcher", DEFAULT_MATCHER)
-        return f"no maps: decoders estimate {len(header.array.real)} a frame set, by matcher {matcher}"
+        return f"no maps: {estimating}"
+    if header.estimates_maps:
+        return f"maps of {count(len(header.map_cameras), 'camera')} for prediction alone: {estimating}"
     size = "half" if header.disparity_scale == 2 else "full"
     return f"maps of {size} size from {count(len(header.map_cameras), 'camera')}"
 
@@ -115,6 +118,7 @@ def document(info: StreamInfo) -> dict[str, Any]:
         "disparity_range_px": list(info.header.disparity_range_px),
         "disparity_scale": info.header.disparity_scale,
         "disparity_cameras": info.header.disparity_cameras,
+        "disparity_use": info.header.disparity_use,
         "predicted": [
             {"camera": list(each.camera), "from": [list(other) for other in each.references]}
             for each in info.header.predicted

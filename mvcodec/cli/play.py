@@ -69,7 +69,7 @@ def _renderer(arguments: argparse.Namespace) -> str:
     if asks_this_program:
         return "server"
     with McapReader.open(arguments.input, limits_of(arguments)) as reader:
-        return "server" if reader.header.disparity_cameras == "none" else "web"
+        return "server" if reader.header.version > 1 else "web"
 
 
 def _serve_file(arguments: argparse.Namespace) -> None:

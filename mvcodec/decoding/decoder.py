@@ -236,7 +236,8 @@ class Decoder(Closing):
         except SettingError as error:
             raise StreamError(self._name, f"codec {error.found}", error.expected) from None
         sizes = track_sizes(header.array.width, header.array.height, header.disparity_scale)
-        self._matcher = None if header.map_cameras else decoding_matcher(header, self._asked_matcher)
+        estimates = header.estimates_maps
+        self._matcher = decoding_matcher(header, self._asked_matcher) if estimates else None
         self._header = header
         self._decoders, self._predicted = {}, {}
         for track in header.tracks:
@@ -301,7 +302,8 @@ class Decoder(Closing):
         self._tell_absent(reasons, first)
         there = [camera for camera in array.real if camera not in reasons]
         senders = [camera for camera in self.header.map_cameras if camera not in reasons]
-        if not (senders or (self._matcher and can_be_estimated(array, there))):
+        matcher = self._matcher if self._matcher and can_be_estimated(array, there) else None
+        if not (senders or matcher):
             return []
         textures = [planes[self.header.picture_track(camera)] for camera in there]
         pictures: Mapping[Position, Picture] = OnDemand(
@@ -309,10 +311,10 @@ class Decoder(Closing):
             lambda _, found: to_picture(found, array.width, array.height),
         )
         disparities: Mapping[Position, DisparityMap]
-        if self._matcher is None:
+        if matcher is None:
             disparities = self._sent_maps(planes, there, senders, pictures)
         else:
-            find = partial(estimate_maps, array, pictures, span, self._matcher)
+            find = partial(estimate_maps, array, pictures, span, matcher)
             disparities = MapsOnDemand(there, find)
         if reasons:
             pictures, disparities = fill_absent(array, pictures, disparities)

@@ -29,6 +29,12 @@ DISPARITY_SHARE = 0.12
 """The maps' share in bitrate mode where every camera sends one; at the best map QP it is 0.09 to 0.18 on
 shop_v3, 0.06 to 0.08 on shop_v4 and 0.10 to 0.16 on the sample, for pictures of QP 27 to 35."""
 
+PREDICTING_CAMERAS = "alternate"
+"""Which cameras send a map where maps serve prediction alone."""
+
+PREDICTING_EXTRA = 0
+"""QPs, on libx264's scale, that such maps are coarser by."""
+
 DEFAULT_RATE = RateControl(qp=27)
 
 
@@ -75,7 +81,8 @@ class EncoderConfig:
     disparity_cameras: str | None = setting(
         None,
         "the real cameras that send a map: all; alternate: every second one, and decoders derive the others';"
-        " none: decoders estimate all maps; auto: what costs fewest bits at equal quality (default: all or"
+        " none: decoders estimate all maps (beside predicted pictures some are sent, for prediction alone);"
+        " auto: what costs fewest bits at equal quality (default: all or"
         " alternate, chosen for the pictures' quantiser)",
         choices=(*DISPARITY_CAMERAS, AUTO),
     )
@@ -113,12 +120,8 @@ class EncoderConfig:
         check_qp("enhance", None if isinstance(self.enhance, str) else self.enhance, max_qp)
         self.rate.check_scale(max_qp)
         check_settings(self)
-        if self.enhance is not None and self.disparity_cameras == "none":
-            raise SettingError("disparity_cameras", "none", "maps, which an enhancement layer needs")
         if self.enhance_views is not None and self.enhance is None:
             raise SettingError("enhance_views", "given", "enhance beside it")
-        if self.prediction != "none" and self.disparity_cameras == "none":
-            raise SettingError("disparity_cameras", "none", f"maps, which prediction {self.prediction} needs")
         if self.prediction != "none" and self.rate.bitrate_kbps is not None:
             raise SettingError("prediction", f"{self.prediction} with a bit rate", "qp or crf beside it")
         span = self.disparity_range_px
@@ -174,10 +177,17 @@ class EncoderConfig:
         """Which real cameras of an array send a map, as `StreamHeader.disparity_cameras`."""
         if self.disparity_cameras == AUTO and self.prediction == "none" and self.enhance is None:
             return best_disparity_cameras(self.quality, self.codec, array)
+        if self.use_for(array) == "prediction":
+            return PREDICTING_CAMERAS
         given = self.disparity_cameras
         if given is not None and given != AUTO:
             return given
         return default_disparity_cameras(self.quality, self.codec, array)
+
+    def use_for(self, array: CameraArray) -> str:
+        """What the maps are for, as `StreamHeader.disparity_use`."""
+        predicts = self.enhance is not None or (self.prediction != "none" and len(array.real) > 1)
+        return "prediction" if predicts and self.disparity_cameras == "none" else "all"
 
     def rate_of_pictures(self, array: CameraArray) -> RateControl:
         """The rate control of one camera's pictures."""
@@ -196,7 +206,11 @@ class EncoderConfig:
             return _share(self._base_kbps, DISPARITY_SHARE, array)
         assert self.quality is not None
         scale, cameras = self.scale_for(array), self.cameras_for(array)
-        return RateControl(qp=default_disparity_qp(self.quality, scale, cameras, range_px, self.codec))
+        qp = default_disparity_qp(self.quality, scale, cameras, range_px, self.codec)
+        if self.use_for(array) == "prediction":
+            codec = find_codec(self.codec)
+            qp = min(round(qp + PREDICTING_EXTRA * codec.qp_line[0]), codec.max_qp)
+        return RateControl(qp=qp)
 
 
 def _share(kbps: float, share: float, array: CameraArray) -> RateControl:

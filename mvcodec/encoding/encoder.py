@@ -258,9 +258,9 @@ class Encoder:
             span = estimate_range(self.array, [frames], self.array.disparity_hint_px)
         codec, cameras = self.config.codec, self.config.cameras_for(self.array)
         maps = None if cameras == "none" else self.config.rate_of_maps(self.array, span)
-        settings = self._settings_record(maps)
+        settings, use = self._settings_record(maps), self.config.use_for(self.array)
         return StreamHeader(
-            self.array, span, codec, frames.index, settings, self._scale, cameras, self._order
+            self.array, span, codec, frames.index, settings, self._scale, cameras, self._order, use
         )
 
     def _settings_record(self, maps: RateControl | None) -> dict[str, Any]:
