@@ -1,7 +1,7 @@
 /** Messages -> frame sets, in order; says what is missing or out of place. */
 
-import { parseHeader, type Header } from "./header.ts";
-import { HEADER_TOPIC, parseVideo, tracksOf, type FrameSet } from "./messages.ts";
+import { countEnhanced, parseHeader, type Header } from "./header.ts";
+import { HEADER_TOPIC, LAYER_TOPIC, parseVideo, tracksOf, type FrameSet } from "./messages.ts";
 import type { TopicMessage } from "./records.ts";
 
 /** What is wrong with a file without ending it, for people. */
@@ -35,7 +35,10 @@ export class Assembler {
     let pending: Pending | undefined;
     for (const message of messages) {
       if (message.topic === HEADER_TOPIC) this.#takeHeader(message);
-      else if (!this.#topics.has(message.topic)) continue;
+      else if (message.topic === LAYER_TOPIC && this.header !== undefined) {
+        this.header = { ...this.header, enhancedViews: countEnhanced(message.data) };
+        continue;
+      } else if (!this.#topics.has(message.topic)) continue;
       if (pending === undefined || message.sequence !== pending.sequence) {
         this.#finish(pending, sets);
         pending = { sequence: message.sequence, timeNs: message.timeNs, isKey: false, units: new Map() };

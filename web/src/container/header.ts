@@ -44,6 +44,8 @@ export interface Header {
   readonly mapCameras: MapCameras;
   /** [row, col] of the cameras whose pictures are coded from those of others, in a way that browsers cannot decode. */
   readonly predicted: readonly (readonly [number, number])[];
+  /** Views of the file's enhancement layer, which this player shows as synthesised. */
+  readonly enhancedViews: number;
   /** As it stands in the file, for those who compare it. */
   readonly document: unknown;
 }
@@ -112,7 +114,17 @@ export function parseHeader(text: Uint8Array): Header {
   const codec = fields.get("codec") as Codec;
   if (!CODECS.includes(codec)) throw fields.wrong("codec", codec, CODECS.join(", "));
   const array = readArray(fields.inner("array"));
-  return { codec, ...array, ...readMaps(fields, version), predicted: readPredicted(fields, version, array), document };
+  return { codec, ...array, ...readMaps(fields, version), predicted: readPredicted(fields, version, array), enhancedViews: 0, document };
+}
+
+/** How many views the header of an enhancement layer names; 0 where it says nothing of the kind. */
+export function countEnhanced(text: Uint8Array): number {
+  try {
+    const { views } = JSON.parse(new TextDecoder().decode(text));
+    return Array.isArray(views) ? views.length : 0;
+  } catch {
+    return 0;
+  }
 }
 
 function readArray(array: Fields) {

@@ -6,6 +6,7 @@ import type { Header } from "./header.ts";
 import { FileError } from "./limits.ts";
 
 export const HEADER_TOPIC = "/mvcodec/header";
+export const LAYER_TOPIC = "/mvcodec/enhancement";
 
 export type TrackKind = "video" | "disparity";
 

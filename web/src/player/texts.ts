@@ -29,6 +29,7 @@ export const TEXTS = {
   predicted: (count: number) =>
     `${count} of this file's cameras are coded from the others, which browsers cannot decode: the nearest of the other cameras is shown. ` +
     "mvcodec play --renderer server shows all views",
+  enhanced: (count: number) => `This file has ${count} enhanced views: this page shows them as synthesised`,
   noWebCodecs:
     "This page may not decode video here: browsers allow it on https:// and on this machine only. Try mvcodec play --renderer server",
   disparity: (px: number, metres: number | undefined) =>

@@ -112,6 +112,7 @@ export class Ui {
     this.#big.hidden = engine.count < 2 || this.#host.hasAttribute("autoplay");
     if (engine.header.predicted.length > 0) this.tell(TEXTS.predicted(engine.header.predicted.length));
     else if (engine.header.mapCameras === "none") this.tell(TEXTS.noMaps);
+    else if (engine.header.enhancedViews > 0) this.tell(TEXTS.enhanced(engine.header.enhancedViews));
     const isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const sways = !this.#isTouched && !isViewGiven && !isStill;
     this.looking.attach(engine, sways);
