@@ -47,15 +47,19 @@ class MessageClock:
         self._topics: dict[str, _Topic] = {}
         self._shifts: list[int] = []
 
-    def time_of(self, message: RecordedPicture) -> int | None:
-        """When a picture was taken, ns; None where that is not after the one before."""
+    def time_of(self, message: RecordedPicture, was_set: bool = False) -> int | None:
+        """When a picture was taken, ns; None where that is not after the one before.
+
+        Args:
+            was_set: the clock was set since the picture before.
+        """
         topic = self._topics.get(message.topic)
         ahead = message.stamp_ns - message.log_ns if message.stamp_ns > 0 else 0
         if topic is None:
             self._topics[message.topic] = _Topic(message.time_ns, message.log_ns, message.time_ns, ahead)
             return message.time_ns
         time_ns = message.time_ns + topic.shift_ns
-        if topic.time_ns - time_ns >= SET_BACK_NS:
+        if was_set or topic.time_ns - time_ns >= SET_BACK_NS:
             topic.shift_ns = self._shift(topic, message)
             time_ns = message.time_ns + topic.shift_ns
         if time_ns <= topic.time_ns:
@@ -104,6 +108,7 @@ class MessageClock:
                 return shift
         self._shifts.append(own)
         back = (topic.raw_ns + passed - message.time_ns) / 1e9
-        text = f"the clock of {message.topic} was set back by {back:.3f} s at {topic.raw_ns / 1e9:.3f} s"
+        how = f"was set back by {back:.3f} s" if back > 0 else f"jumped ahead by {-back:.3f} s"
+        text = f"the clock of {message.topic} {how} at {topic.raw_ns / 1e9:.3f} s"
         warnings.warn(f"{self._name}: {text}; times go on from there", MvCodecWarning, stacklevel=4)
         return own

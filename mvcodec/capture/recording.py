@@ -16,7 +16,7 @@ from mvcodec.capture.recorded_calibration import NotRectified, array_calibration
 from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.capture.selection import select_real
 from mvcodec.capture.timing import rate_of_times
-from mvcodec.capture.topic_pictures import TopicPictures, WaitingPicture
+from mvcodec.capture.topic_pictures import NOT_AFTER, TopicPictures, WaitingPicture
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.recorded_pictures import RecordedPicture, RecordingReader
 from mvcodec.container.recorded_rig import RecordedRig
@@ -93,7 +93,7 @@ class Recording:
             filter(None, map(typical_step_ns, self._reader.log_times.values())), default=None
         )
         self._last_ns: int | None = None
-        self._dropped = self._told = 0
+        self._dropped = self._told = self._repeated = 0
         self._apart = dict.fromkeys(self._queues, (0, 0))
         self._checked_apart = False
         self._frames: dict[Position, str] = {}
@@ -130,6 +130,8 @@ class Recording:
             self._warn(f"cut off after {self._last_ns / 1e9:.3f} s")
         if self._dropped > _TOLD:
             self._warn(f"{self._dropped} pictures were dropped in all")
+        if self._repeated > _TOLD and 2 * self._repeated > self._dropped and self._settings.clock == "stamp":
+            self._warn("most of them have stamps that stand still; `clock` log takes when they were written")
         step = self._step_ns()
         for position, (low, high) in self._apart.items():
             if step and high - low <= TOLD_SHARE * step < max(-low, high):
@@ -217,7 +219,10 @@ class Recording:
                 self._tell_unreadable(error)
             yield from self._together()
         for camera, pictures in self._pictures.items():
-            self._wait(camera, pictures.flush())
+            try:
+                self._wait(camera, pictures.flush())
+            except InputError as error:
+                self._tell_unreadable(error)
         yield from self._together()
         for queue in self._queues.values():
             while queue:
@@ -290,5 +295,6 @@ class Recording:
     def _tell(self, message: RecordedPicture, why: str) -> None:
         self._dropped += 1
         self._told += 1
+        self._repeated += why == NOT_AFTER
         if self._told <= _TOLD:
             self._warn(f"{message.label}: dropped, {why}")

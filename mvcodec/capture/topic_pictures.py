@@ -12,6 +12,7 @@ from av.video.reformatter import VideoReformatter
 from mvcodec.capture.bit_depth import BitDepth
 from mvcodec.capture.message_clock import SET_BACK_NS, MessageClock
 from mvcodec.capture.picture_messages import StillDecoder
+from mvcodec.capture.stamp_check import Judged, StampCheck
 from mvcodec.capture.video_input import frame_to_rgb
 from mvcodec.capture.video_messages import LeftOut, ShownPicture, VideoDecoder
 from mvcodec.container.recorded_pictures import RecordedPicture
@@ -20,6 +21,7 @@ from mvcodec.frames import Picture
 REORDERED = 8
 """Still pictures among which those whose stamps are out of order are put in order."""
 
+WRONG_STAMP = "its time is far from those before and after it"
 NOT_AFTER = "its time is not after the one before"
 
 
@@ -67,6 +69,9 @@ class TopicPictures:
         self._reformatter = VideoReformatter()
         self._early: list[tuple[int, int, RecordedPicture]] = []
         self._count = 0
+        self._check = StampCheck(settled)
+        self._wrong: set[RecordedPicture] = set()
+        self._set: set[RecordedPicture] = set()
 
     def push(self, message: RecordedPicture) -> list[WaitingPicture]:
         """The pictures that are next, in the order of their time.
@@ -74,21 +79,45 @@ class TopicPictures:
         Raises:
             InputError: damaged, or of a format that mvcodec doesn't know.
         """
-        if message.kind == "video":
-            try:
-                return self._videos(self._video.push(message))
-            except LeftOut as reason:
-                self._leave_out(message, str(reason))
-                return []
+        return self._judged(self._check.push(message))
+
+    def flush(self) -> list[WaitingPicture]:
+        """The pictures that are left inside.
+
+        Raises:
+            InputError: damaged, or of a format that mvcodec doesn't know.
+        """
+        found = self._judged(self._check.flush())
+        return found + self._videos(self._video.flush()) + self._stills(0)
+
+    def _judged(self, messages: list[Judged]) -> list[WaitingPicture]:
+        found = []
+        for message, verdict in messages:
+            if verdict == "set":
+                self._set.add(message)
+            if message.kind == "video":
+                if verdict == "wrong":
+                    self._wrong.add(message)  # others build on it
+                found += self._decoded(message)
+            elif verdict == "wrong":
+                self._leave_out(message, WRONG_STAMP)
+            else:
+                found += self._sorted(message)
+        return found
+
+    def _decoded(self, message: RecordedPicture) -> list[WaitingPicture]:
+        try:
+            return self._videos(self._video.push(message))
+        except LeftOut as reason:
+            self._leave_out(message, str(reason))
+            return []
+
+    def _sorted(self, message: RecordedPicture) -> list[WaitingPicture]:
         set_back = bool(self._early) and self._early[0][0] - message.time_ns >= SET_BACK_NS
         found = self._stills(0) if set_back else []
         heapq.heappush(self._early, (message.time_ns, self._count, message))
         self._count += 1
         return found + self._stills(self._ahead)
-
-    def flush(self) -> list[WaitingPicture]:
-        """The pictures that are left inside."""
-        return self._videos(self._video.flush()) + self._stills(0)
 
     def _videos(self, shown: list[ShownPicture]) -> list[WaitingPicture]:
         found = []
@@ -109,7 +138,12 @@ class TopicPictures:
         return found
 
     def _time(self, message: RecordedPicture) -> int | None:
-        time_ns = self._clock.time_of(message)
+        if message in self._wrong:
+            self._wrong.discard(message)
+            self._leave_out(message, WRONG_STAMP)
+            return None
+        time_ns = self._clock.time_of(message, message in self._set)
+        self._set.discard(message)
         if time_ns is None:
             self._leave_out(message, NOT_AFTER)
             return None
