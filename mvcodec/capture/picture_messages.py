@@ -7,8 +7,9 @@ import warnings
 import numpy as np
 
 from mvcodec.capture.bit_depth import BitDepth, DeepPixels
-from mvcodec.capture.raw_pixels import RAW_ENCODINGS, Pixels, RawEncoding
+from mvcodec.capture.raw_pixels import RAW_ENCODINGS, Pixels, RawEncoding, find_encoding
 from mvcodec.capture.still_pictures import (
+    GREY_MODES,
     UnreadablePicture,
     deep_pixels,
     is_see_through,
@@ -28,6 +29,9 @@ _DEPTH_MAP = "compressedDepth"
 
 _SWAPPED = "compressed rgb"
 """ROS's own reader swaps red and blue of such pictures; many senders of them do not."""
+
+_GREY = ("L", *GREY_MODES)
+"""Modes of pictures whose pixels may be a mosaic of colours."""
 
 _COMPRESSED = "JPEG, PNG, WEBP, TIFF or BMP"
 
@@ -79,7 +83,11 @@ class StillDecoder:
                     raise self._error(message, found, f"at most {MAX_PIXELS} px")
                 if not self._told_alpha and still_facts(picture).alpha and is_see_through(picture):
                     self._tell_alpha(message)
-                return still_to_rgb(picture, message.data, self._depth)
+                pixels = still_to_rgb(picture, message.data, self._depth)
+                mosaic = find_encoding(message.format.split(";")[0])
+                if "bayer" not in message.format.casefold() or mosaic is None or picture.mode not in _GREY:
+                    return pixels
+                return mosaic.convert(pixels[..., :1])
         except UnreadablePicture as error:
             raise self._error(message, f"{error} in format {message.format!r}", _COMPRESSED) from None
 
@@ -96,22 +104,24 @@ class StillDecoder:
     def _rows(self, message: RecordedPicture) -> tuple[RawEncoding, Pixels]:
         assert message.layout is not None
         width, height, step = message.layout
-        if message.format not in RAW_ENCODINGS:
+        encoding = find_encoding(message.format)
+        if encoding is None:
             found = f"raw pixels of encoding {message.format!r}, which is not supported"
             raise self._error(message, found, ", ".join(RAW_ENCODINGS))
-        encoding = RAW_ENCODINGS[message.format]
         used = width * encoding.channels * (2 if encoding.deep else 1)
-        if not (width and height and width * height <= MAX_PIXELS and step >= used):
+        fits = bool(width and height and width * height <= MAX_PIXELS and step >= used)
+        if not fits or (encoding.half_rows % 2 and (width % 2 or height % 2)):
             raise self._error(message, f"{width}x{height} px in rows of {step} bytes", "a picture's layout")
+        rows = height * encoding.half_rows // 2
         # The last row of some senders lacks its padding.
-        if len(message.data) < step * (height - 1) + used:
-            raise self._error(message, f"{len(message.data)} bytes", f"{step * height}")
-        data = np.frombuffer(message.data, np.uint8, min(len(message.data), step * height))
-        padded = np.pad(data, (0, step * height - len(data))).reshape(height, step)[:, :used]
+        if len(message.data) < step * (rows - 1) + used:
+            raise self._error(message, f"{len(message.data)} bytes", f"{step * rows}")
+        data = np.frombuffer(message.data, np.uint8, min(len(message.data), step * rows))
+        padded = np.pad(data, (0, step * rows - len(data))).reshape(rows, step)[:, :used]
         values: Pixels = np.ascontiguousarray(padded)
         if encoding.deep:
             values = values.view(">u2" if message.big_endian else "<u2").astype(np.uint16)
-        return encoding, values.reshape(height, width, encoding.channels)
+        return encoding, values.reshape(rows, width, encoding.channels)
 
     def _tell_alpha(self, message: RecordedPicture) -> None:
         self._told_alpha = True

@@ -22,15 +22,17 @@ class RawEncoding:
 
     Attributes:
         channels: values a pixel.
-        convert: uint8 (H, W, channels) -> uint8 (H, W, 3) RGB.
+        convert: uint8 (rows, W, channels) -> uint8 (H, W, 3) RGB.
         deep: values have 16 bits.
         alpha: the last one says how opaque it is.
+        half_rows: rows in a message for two of the picture's: colours may lie below the brightness.
     """
 
     channels: int
     convert: Callable[[Pixels], Picture]
     deep: bool = False
     alpha: bool = False
+    half_rows: int = 2
 
 
 def _order(*channels: int) -> Callable[[Pixels], Picture]:
@@ -39,6 +41,20 @@ def _order(*channels: int) -> Callable[[Pixels], Picture]:
 
 def _opencv(code: int) -> Callable[[Pixels], Picture]:
     return lambda pixels: np.asarray(cv2.cvtColor(np.ascontiguousarray(pixels), code), np.uint8)
+
+
+def _planar(code: int) -> Callable[[Pixels], Picture]:
+    return lambda pixels: np.asarray(cv2.cvtColor(np.ascontiguousarray(pixels[..., 0]), code), np.uint8)
+
+
+def _nv24(pixels: Pixels) -> Picture:
+    """Brightness, then colours of every pixel by pairs, which OpenCV lacks; with its factors."""
+    height, width = pixels.shape[0] // 3, pixels.shape[1]
+    luma = pixels[:height, :, 0].astype(np.float32)
+    blue, red = np.moveaxis(pixels[height:].reshape(height, width, 2).astype(np.float32) - 128, -1, 0)
+    bright = 1.164 * (luma - 16)
+    rgb = [bright + 1.596 * red, bright - 0.813 * red - 0.391 * blue, bright + 2.018 * blue]
+    return np.stack(rgb, axis=-1).round().clip(0, 255).astype(np.uint8)
 
 
 def _encodings() -> dict[str, RawEncoding]:
@@ -65,8 +81,24 @@ def _encodings() -> dict[str, RawEncoding]:
         table[name] = RawEncoding(2, _opencv(cv2.COLOR_YUV2RGB_UYVY))
     for name in ("yuv422_yuy2", "yuyv"):
         table[name] = RawEncoding(2, _opencv(cv2.COLOR_YUV2RGB_YUY2))
+    for name, code in (
+        ("nv12", cv2.COLOR_YUV2RGB_NV12),
+        ("nv21", cv2.COLOR_YUV2RGB_NV21),
+        ("i420", cv2.COLOR_YUV2RGB_I420),
+    ):
+        table[name] = RawEncoding(1, _planar(code), half_rows=3)
+    table["nv24"] = RawEncoding(1, _nv24, half_rows=6)
     return table
 
 
 RAW_ENCODINGS = _encodings()
 """By name. YUV is taken as BT.601, limited range, as OpenCV does."""
+
+
+_SPELLINGS = {name.casefold(): name for name in RAW_ENCODINGS}
+
+
+def find_encoding(name: str) -> RawEncoding | None:
+    """The encoding of a name, in capitals or not; None where it is unknown."""
+    known = _SPELLINGS.get(name.strip().casefold())
+    return None if known is None else RAW_ENCODINGS[known]

@@ -25,6 +25,9 @@ GREY_MODES = {"I;16": 16, "I;16B": 16, "I;16L": 16, "I": 32, "F": 32}
 SCALING_DECODERS = ("ppm", "ppm_plain")
 """Those of Pillow that stretch values to the whole range themselves."""
 
+_TURNED_WHEN_READ = ("TIFF",)
+"""Pillow and OpenCV turn these by themselves, and no others."""
+
 _ALPHA_MODES = frozenset({"RGBA", "LA", "PA", "La", "RGBa"})
 _SIGNIFICANT_BITS = b"sBIT"
 
@@ -74,7 +77,8 @@ def opened_still(source: Path | bytes) -> Iterator[ImageFile.ImageFile]:
 
 def still_facts(picture: ImageFile.ImageFile) -> StillFacts:
     """What the header of an opened picture says."""
-    orientation = exif_orientation(picture.getexif().get(ExifTags.Base.Orientation))
+    tag = None if picture.format in _TURNED_WHEN_READ else picture.getexif().get(ExifTags.Base.Orientation)
+    orientation = exif_orientation(tag)
     alpha = picture.mode in _ALPHA_MODES or "transparency" in picture.info
     return StillFacts(orientation.size(*picture.size), orientation, alpha, _bits(picture))
 
