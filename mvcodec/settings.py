@@ -94,10 +94,18 @@ class Setting:
         Raises:
             SettingError: it stands for none that is allowed.
         """
-        nothing = self.optional and text in NONE_WORDS and text not in (self._choices or ())
-        value = None if nothing else self._value(text, name or self.name)
+        value = self.parsed(text, name)
         self.check(value, name)
         return value
+
+    def parsed(self, text: str, name: str = "") -> Any:
+        """The value that a text stands for, whatever it is.
+
+        Raises:
+            SettingError: it stands for none.
+        """
+        nothing = self.optional and text in NONE_WORDS and text not in (self._choices or ())
+        return None if nothing else self._value(text, name or self.name)
 
     @property
     def _choices(self) -> Collection[Any] | None:

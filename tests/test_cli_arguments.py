@@ -11,16 +11,28 @@ from pathlib import Path
 import pytest
 from small_arrays import write_array
 
+from mvcodec.capture.recording_settings import RecordingSettings
+from mvcodec.capture.timing import Timing
 from mvcodec.cli.arguments import (
-    disparity_qp,
+    OPTIONS,
     disparity_range,
     frame_slice,
+    in_options,
     join_negative_values,
     pair_of_sizes,
     positive_int,
     view,
 )
 from mvcodec.cli.main import COMMANDS, command_parser, main
+from mvcodec.cli.setting_options import reader
+from mvcodec.encoding.config import EncoderConfig
+from mvcodec.errors import SettingError
+from mvcodec.output.styles import ShotSettings
+from mvcodec.scenes.scene import SceneSettings
+from mvcodec.settings import settings_of
+from mvcodec.video.codec import RateControl
+
+disparity_qp = reader(settings_of(EncoderConfig)["disparity_qp"])
 
 
 @pytest.mark.parametrize(
@@ -153,7 +165,7 @@ def test_help_does_not_load_what_only_the_commands_need() -> None:
 def test_words_that_everyone_uses_are_understood() -> None:
     encode = command_parser("encode")
     parsed = encode.parse_args(["in", "o.mcap", "--codec", "H265", "--bitrate", "2.5M"])
-    assert (parsed.codec, parsed.bitrate) == ("hevc", 2500)
+    assert (parsed.codec, parsed.bitrate_kbps) == ("hevc", 2500)
     assert encode.parse_args(["in", "o.mcap", "--bitrate", "800k"]).bitrate == 800
     assert command_parser("sample").parse_args(["out", "--size", "1080p"]).size == (1920, 1080)
 
@@ -166,3 +178,53 @@ def test_a_misspelt_name_in_the_library_s_lists_gets_a_suggestion(
     message = capsys.readouterr().err
     assert message.startswith("mvcodec: error: --matcher: found jiont, expected one of joint")
     assert message.endswith("did you mean joint?\n")
+
+
+@pytest.mark.parametrize(
+    ("command", "settings", "other"),
+    [
+        ("encode", EncoderConfig, {"depth"}),
+        ("encode", RateControl, set()),
+        ("encode", Timing, set()),
+        ("encode", RecordingSettings, set()),
+        ("evaluate", EncoderConfig, {"depth"}),
+        ("sample", SceneSettings, set()),
+        ("render", ShotSettings, set()),
+    ],
+)
+def test_options_say_what_the_fields_of_their_settings_say(
+    command: str, settings: type, other: set[str]
+) -> None:
+    """`depth` chooses a form too, so that its option is another one."""
+    options = {
+        option: action for action in command_parser(command)._actions for option in action.option_strings
+    }
+    for name, known in settings_of(settings).items():
+        if name not in other:
+            meaning, _, default = in_options(known.help).partition(" (default: ")
+            shown = (options[OPTIONS[name]].help or "").replace("%%", "%")
+            assert shown.startswith(meaning), name
+            assert default in shown or "default" in shown, name
+
+
+@pytest.mark.parametrize(
+    ("arguments", "settings", "name", "value"),
+    [
+        (["encode", "in", "o.mcap", "--gop", "0"], EncoderConfig, "gop", 0),
+        (["encode", "in", "o.mcap", "--disparity-median", "4"], EncoderConfig, "disparity_median", 4),
+        (["encode", "in", "o.mcap", "--tolerance-ms", "-1"], Timing, "tolerance_ms", -1.0),
+        (["encode", "in", "o.mcap", "--bitrate", "0.5"], RateControl, "bitrate_kbps", 0.5),
+        (["sample", "out", "--frames", "0"], SceneSettings, "frames", 0),
+    ],
+)
+def test_the_command_line_refuses_what_the_library_refuses_in_its_words(
+    arguments: list[str], settings: type, name: str, value: object, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SettingError) as refused:
+        settings(**{name: value})
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+    line = capsys.readouterr().err
+    assert line.startswith(f"mvcodec: error: {OPTIONS[name]}: found {arguments[-1]}, expected ")
+    assert refused.value.expected in line

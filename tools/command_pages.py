@@ -1,27 +1,40 @@
-"""The page of the command line, written from the parsers themselves: a hook of MkDocs (see mkdocs.yml).
+"""Pages written from the program itself: commands from their parsers, settings from their fields.
 
-In docs/command-line.md the line `<!-- commands -->` becomes a section for each command.
+A hook of MkDocs (see mkdocs.yml). The line `<!-- commands -->` becomes a section for each command, and
+`<!-- settings mvcodec.X -->` a table of the settings of a class.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mvcodec
 from mvcodec.cli.main import COMMANDS, command_parser
-
-if TYPE_CHECKING:
-    from mkdocs.structure.pages import Page
+from mvcodec.settings import settings_of, show
 
 MARK = "<!-- commands -->"
-PAGE = "command-line.md"
+SETTINGS = re.compile(r"<!-- settings mvcodec\.(\w+) -->")
 USAGE_WIDTH = 76
 
 
-def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """What MkDocs calls for each page: its text, with the commands in place of the mark."""
-    return markdown.replace(MARK, commands_text()) if page.file.src_uri == PAGE else markdown
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """What MkDocs calls for each page: its text, with commands and settings in place of their marks."""
+    if MARK in markdown:
+        markdown = markdown.replace(MARK, commands_text())
+    return SETTINGS.sub(lambda mark: settings_text(getattr(mvcodec, mark[1])), markdown)
+
+
+def settings_text(cls: type) -> str:
+    """A table of the settings of a class: name, default, what is allowed, and what it means."""
+    rows = [
+        f"| `{name}` | {'' if known.default is None else f'`{show(known.default)}`'}"
+        f" | {_cell(known.allowed)} | {_cell(_sentence(known.help))} |"
+        for name, known in settings_of(cls).items()
+    ]
+    return "\n".join(["| setting | default | allowed | meaning |", "|---|---|---|---|", *rows])
 
 
 def commands_text() -> str:

@@ -15,6 +15,9 @@ DeepPixels = NDArray[np.uint16]
 _DEPTHS = (8, 10, 12, 14, 16)
 
 
+LEAST_BITS, MOST_BITS = 8, 16
+
+
 class BitDepth:
     """How many bits of 16 the pictures of an input use; one for all its cameras.
 
@@ -30,8 +33,8 @@ class BitDepth:
     """
 
     def __init__(self, name: str, bits: int | None = None) -> None:
-        if bits is not None and not 8 <= bits <= 16:
-            raise SettingError("bits", bits, "8..16")
+        if bits is not None and not LEAST_BITS <= bits <= MOST_BITS:
+            raise SettingError("bits", bits, f"{LEAST_BITS}..{MOST_BITS}")
         self._name, self._given, self._bits, self._told = name, bits, bits, False
 
     def look(self, pixels: DeepPixels) -> None:

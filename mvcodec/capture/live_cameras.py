@@ -18,10 +18,12 @@ from mvcodec.capture.live_clock import common_clock
 from mvcodec.capture.pairing import NEAREST_SHARE
 from mvcodec.capture.recorded_calibration import RecordedCamera
 from mvcodec.capture.selection import select_real
+from mvcodec.capture.timing import nominal_fps, tolerance
 from mvcodec.capture.video_input import frame_to_rgb
 from mvcodec.container.recorded_pictures import Clock
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet, Picture
+from mvcodec.settings import check_settings, setting
 
 SETTLE_S = 0.7
 """How long every camera is listened to before its clock is believed."""
@@ -39,12 +41,10 @@ class LiveSettings:
         addresses: of all cameras of the grid, row by row.
         grid: (rows, cols).
         real: which cameras are real, as `select_real` reads it.
-        fps: nominal frame rate; None: from the stamps.
-        tolerance_ms: how far apart the pictures of one frame set may be taken; None: half a frame.
+        fps, tolerance_ms, patience_s: explained by their fields.
         calibration: of all cameras; None: nominal.
         clock: the senders' stamps, or arrival; None: stamps where they seem to be of one clock.
         offsets_ms: what is added to the times of an address.
-        patience_s: how long nothing may come before the input counts as ended.
 
     Raises:
         SettingError: the grid doesn't fit, or a number is out of range.
@@ -53,12 +53,18 @@ class LiveSettings:
     addresses: Sequence[str]
     grid: tuple[int, int]
     real: str = "corners"
-    fps: float | None = None
-    tolerance_ms: float | None = None
+    fps: float | None = nominal_fps()
+    tolerance_ms: float | None = tolerance()
     calibration: Calibration | None = None
     clock: Clock | None = None
     offsets_ms: Mapping[str, float] = field(default_factory=dict)
-    patience_s: float = 10.0
+    patience_s: float = setting(
+        10.0,
+        "how long nothing may come from live cameras before the input counts as ended, seconds; until then"
+        " they are opened again",
+        low=0.001,
+        high=86_400,
+    )
 
     def __post_init__(self) -> None:
         rows, cols = self.grid
@@ -66,8 +72,7 @@ class LiveSettings:
             raise SettingError("grid", f"{rows}x{cols}", f"a grid of {len(self.addresses)} cameras")
         if len(set(self.addresses)) != len(self.addresses):
             raise SettingError("INPUT", "an address twice", "each camera once")
-        if not 0 < self.patience_s <= 86_400:
-            raise SettingError("patience_s", self.patience_s, "more than 0, at most 86400 s")
+        check_settings(self)
         for address in self.offsets_ms:
             if address not in self.addresses:
                 raise SettingError(

@@ -7,9 +7,12 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import get_args
 
-from mvcodec.array import MAX_FPS, MIN_FPS, Calibration
+from mvcodec.array import Calibration
+from mvcodec.capture.reading import used_bits
+from mvcodec.capture.timing import nominal_fps, tolerance
 from mvcodec.container.recorded_pictures import Clock
 from mvcodec.errors import SettingError
+from mvcodec.settings import check_settings, setting
 
 TopicGrid = tuple[tuple[str, ...], ...]
 
@@ -21,13 +24,9 @@ class RecordingSettings:
     Attributes:
         topics: of every view of the grid, row by row.
         real: which cameras are real, as `select_real` reads it.
-        fps: nominal frame rate; None: from the recording's times.
-        tolerance_ms: how far apart the pictures of one frame set may be taken; None: half of the
-            shortest time from picture to picture.
         calibration: of all cameras; None: the recording's own, or nominal.
-        clock: which time counts: the messages' own stamps, or when they were written down.
         offsets_ms: what is added to a topic's times.
-        bits: how many bits of 16-bit pictures are used; None: see `BitDepth`.
+        fps, tolerance_ms, clock, bits: explained by their fields.
 
     Raises:
         SettingError: the grid is not one, names a topic twice, or a number is out of range.
@@ -35,12 +34,16 @@ class RecordingSettings:
 
     topics: TopicGrid
     real: str = "corners"
-    fps: float | None = None
-    tolerance_ms: float | None = None
+    fps: float | None = nominal_fps()
+    tolerance_ms: float | None = tolerance()
     calibration: Calibration | None = None
-    clock: Clock = "stamp"
+    clock: Clock = setting(
+        "stamp",
+        "the times that count: the pictures' own stamps, or when they were written down or arrived",
+        choices=get_args(Clock),
+    )
     offsets_ms: Mapping[str, float] = field(default_factory=dict)
-    bits: int | None = None
+    bits: int | None = used_bits()
 
     def __post_init__(self) -> None:
         widths = {len(row) for row in self.topics}
@@ -49,12 +52,7 @@ class RecordingSettings:
             raise SettingError("topics", f"rows of {sorted(widths)} topics", "rows of one length")
         if len(set(names)) != len(names):
             raise SettingError("topics", "a topic twice", "each topic once")
-        if self.fps is not None and not MIN_FPS <= self.fps <= MAX_FPS:
-            raise SettingError("fps", self.fps, f"{MIN_FPS:g}..{MAX_FPS:g}")
-        if self.tolerance_ms is not None and not 0 <= self.tolerance_ms <= 10_000:
-            raise SettingError("tolerance_ms", self.tolerance_ms, "0..10000 ms")
-        if self.clock not in get_args(Clock):
-            raise SettingError("clock", self.clock, " or ".join(get_args(Clock)))
+        check_settings(self)
 
     @property
     def grid(self) -> tuple[int, int]:

@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
+from typing import Any
 
 from mvcodec.array import MAX_FPS, MIN_FPS
 from mvcodec.capture.pairing import typical_step_ns
 from mvcodec.errors import SettingError
+from mvcodec.settings import check_settings, setting
 
 SYNCS = ("motion", "audio")
 
@@ -23,30 +25,46 @@ _MEDIAN_SHARE = 1e-3
 _USUAL_SHARE = 0.25
 
 
+def nominal_fps() -> Any:
+    """The field of every settings class that has a frame rate."""
+    return setting(
+        None,
+        "nominal frame rate, and that of files without times (default: from the times)",
+        low=MIN_FPS,
+        high=MAX_FPS,
+    )
+
+
+def tolerance() -> Any:
+    """The field of every settings class that says which pictures belong to one time."""
+    return setting(
+        None,
+        "how far apart pictures of one frame set may be taken, ms (default: half of a frame's time)",
+        low=0,
+        high=10_000,
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """When pictures were taken, as far as the user knows better than the files.
-
-    Attributes:
-        fps: pictures a second of files that have no times of their own, and the nominal frame rate.
-        offsets_ms: what is added to the times of a camera's pictures, by its file's name or place.
-        sync: what estimates the other offsets: ``motion`` in the pictures, or ``audio``; None: nothing.
-        tolerance_ms: how far apart the pictures of one frame set may be taken; None: see `pair_pictures`.
+    """When pictures were taken, as far as the user knows better than the files. Fields explain themselves.
 
     Raises:
         SettingError: a number is out of range.
     """
 
-    fps: float | None = None
+    fps: float | None = nominal_fps()
     offsets_ms: Mapping[str, float] = field(default_factory=dict)
-    tolerance_ms: float | None = None
-    sync: str | None = None
+    """What is added to the times of a camera's pictures, by its file's name or place, ms."""
+    tolerance_ms: float | None = tolerance()
+    sync: str | None = setting(
+        None,
+        "estimate the other offsets of files from what moves in their pictures, or from their sound tracks",
+        choices=SYNCS,
+    )
 
     def __post_init__(self) -> None:
-        if self.fps is not None and not MIN_FPS <= self.fps <= MAX_FPS:
-            raise SettingError("fps", self.fps, f"{MIN_FPS:g}..{MAX_FPS:g}")
-        if self.sync not in (None, *SYNCS):
-            raise SettingError("sync", self.sync, " or ".join(SYNCS))
+        check_settings(self)
         for camera, offset in self.offsets_ms.items():
             if not math.isfinite(offset):
                 raise SettingError("offsets_ms", f"{camera}={offset}", "CAMERA=MS, a number of milliseconds")

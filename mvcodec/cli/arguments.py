@@ -25,12 +25,14 @@ OPTIONS = {
     "bitrate_kbps": "--bitrate",
     "target_psnr": "--target-psnr",
     "disparity_qp": "--disparity-qp",
+    "disparity_range_px": "--disparity-range",
     "disparity_scale": "--disparity-scale",
     "disparity_cameras": "--disparity-cameras",
     "disparity_median": "--disparity-median",
     "gop": "--gop",
     "matcher": "--matcher",
     "preset": "--preset",
+    "speed": "--speed",
     "prediction": "--prediction",
     "enhance": "--enhance",
     "enhance_views": "--enhance-views",
@@ -51,6 +53,7 @@ OPTIONS = {
     "nominal": "--nominal",
     "offsets_ms": "--offset",
     "path": "--path",
+    "patience_s": "--patience",
     "port": "--port",
     "qps": "--qp",
     "real": "--real",
@@ -134,14 +137,6 @@ def codec_name(text: str) -> str:
     return CODEC_WORDS.get(text.lower(), text.lower())
 
 
-def bit_rate(text: str) -> float:
-    """kbit/s: ``2000``, ``2000k`` or ``2M``."""
-    match = re.fullmatch(r"(-?\d+(?:\.\d+)?)([kM]?)(?:bit/s|bps)?", text)
-    if match is None:
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected kbit/s such as 2000, or 2M")
-    return float(match[1]) * (1000 if match[2] == "M" else 1)
-
-
 def frame_slice(text: str) -> slice:
     """``A:B`` as a Python slice; either end may be left out or negative."""
     match = re.fullmatch(r"(-?\d{1,15})?:(-?\d{1,15})?", text)
@@ -202,15 +197,6 @@ def _two_numbers(text: str, expected: str) -> tuple[float, float]:
     if not (math.isfinite(first) and math.isfinite(second)):
         raise argparse.ArgumentTypeError(f"found {text!r}, expected {expected}")
     return first, second
-
-
-def disparity_qp(text: str) -> int | None:
-    """A QP, or None for ``auto``."""
-    if text == "auto":
-        return None
-    if not re.fullmatch(r"-?\d{1,9}", text):
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected a QP or auto")
-    return int(text)
 
 
 def add_synthesizer(parser: argparse.ArgumentParser) -> None:

@@ -12,21 +12,30 @@ from mvcodec.capture import ArraySource
 from mvcodec.cli.arguments import (
     SPECIFICATION,
     codec_name,
-    disparity_qp,
     disparity_range,
     pair_of_sizes,
 )
 from mvcodec.cli.paths import local_path
-from mvcodec.encoding.config import AUTO
+from mvcodec.cli.setting_options import add_setting
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
-from mvcodec.encoding.speed_choice import FOR_FILES, FOR_LIVE, SPEEDS
+from mvcodec.encoding.speed_choice import FOR_FILES, FOR_LIVE
 from mvcodec.frames import FrameSet
 from mvcodec.layers.refinement import matcher_choices
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
 from mvcodec.stereo.given import given_range
-from mvcodec.stream import DISPARITY_CAMERAS, PREDICTIONS
-from mvcodec.video.codec import PRESETS
-from mvcodec.video.codecs import CODECS
+
+CODING = (
+    "codec",
+    "disparity_qp",
+    "disparity_scale",
+    "disparity_cameras",
+    "prediction",
+    "disparity_median",
+    "gop",
+    "matcher",
+    "preset",
+)
+"""The settings of EncoderConfig that go from `add_coding` to the encoder as they are."""
 
 
 def add_input(
@@ -45,79 +54,34 @@ def add_input(
 
 def add_coding(parser: argparse.ArgumentParser) -> None:
     """How pictures and maps are coded, apart from the rate."""
-    default = EncoderConfig()
-    parser.add_argument(
-        "--speed",
-        choices=SPEEDS,
-        help=f"sets --matcher and --preset together (default: {FOR_FILES}; of standard input and live"
-        f" cameras: {FOR_LIVE})",
+    add_setting(
+        parser,
+        EncoderConfig,
+        "speed",
+        left_open=True,
+        note=f" (default: {FOR_FILES}; of standard input and live cameras: {FOR_LIVE})",
     )
-    parser.add_argument(
-        "--codec",
-        type=codec_name,
-        choices=CODECS,
-        default=default.codec,
-        help="of pictures and maps (default: %(default)s, which viewers are sure to play)",
-    )
-    _add_disparity(parser)
-    parser.add_argument(
-        "--gop", type=int, metavar="N", help="frames from keyframe to keyframe, at most one second's"
-    )
-    parser.add_argument(
-        "--matcher",
-        metavar=SPECIFICATION,
-        help=f"{matcher_choices()}; mvcodec plugins lists settings (default: what --speed has; best:"
-        f" {SPEEDS[FOR_FILES].matcher})",
-    )
-    parser.add_argument(
-        "--preset",
-        metavar="NAME",
-        help=f"effort of video encoders, one of {', '.join(PRESETS)} (default: what --speed has; best:"
-        f" {SPEEDS[FOR_FILES].preset})",
-    )
-
-
-def _add_disparity(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--disparity-qp",
-        type=disparity_qp,
-        metavar="N|auto",
-        help="QP of the disparity maps (default: auto, chosen for the pictures' QP)",
-    )
-    parser.add_argument(
-        "--disparity-scale",
-        type=int,
-        metavar="1|2",
-        help="2: maps at half the pictures' size each way (default: chosen for the pictures' QP)",
-    )
-    parser.add_argument(
-        "--disparity-cameras",
-        choices=(*DISPARITY_CAMERAS, AUTO),
-        help="the real cameras that send a map; alternate: every second one, and decoders derive the others';"
-        " none: decoders estimate all maps, which takes them as long as it takes encoders, and readers of"
-        " format version 1 refuse the file; auto: what costs fewest bits"
-        " (default: all or alternate, chosen for the pictures' QP)",
-    )
-    parser.add_argument(
-        "--prediction",
-        choices=PREDICTIONS,
-        default=EncoderConfig().prediction,
-        help="synthesis: real cameras are coded from each other, for fewer bits; the first one alone plays in"
-        " any viewer, and readers of format version 1 refuse the file (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--disparity-median",
-        type=int,
-        metavar="N",
-        help="smooth maps over N x N before coding, N odd; 0: don't (default: 5, at half size 3)",
-    )
-    parser.add_argument(
-        "--disparity-range",
-        type=disparity_range,
+    add_setting(parser, EncoderConfig, "codec", parse=codec_name)
+    add_setting(parser, EncoderConfig, "disparity_qp", metavar="N|auto")
+    for name in ("disparity_scale", "disparity_cameras", "prediction", "disparity_median"):
+        add_setting(parser, EncoderConfig, name)
+    add_setting(
+        parser,
+        EncoderConfig,
+        "disparity_range_px",
+        parse=disparity_range,
         metavar="LO,HI|auto",
-        help="px between neighbouring real cameras; auto: estimated whatever the input states"
-        " (default: estimated within what it states)",
+        note="; auto: estimated whatever the input states",
     )
+    add_setting(parser, EncoderConfig, "gop")
+    add_setting(
+        parser,
+        EncoderConfig,
+        "matcher",
+        metavar=SPECIFICATION,
+        note=f", {matcher_choices()}; mvcodec plugins lists settings",
+    )
+    add_setting(parser, EncoderConfig, "preset")
 
 
 def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: Any) -> EncoderConfig:
@@ -130,17 +94,7 @@ def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: 
         SettingError: one does not fit.
     """
     config = EncoderConfig(
-        disparity_qp=arguments.disparity_qp,
-        disparity_scale=arguments.disparity_scale,
-        disparity_cameras=arguments.disparity_cameras,
-        disparity_median=arguments.disparity_median,
-        prediction=arguments.prediction,
-        gop=arguments.gop,
-        speed=arguments.speed or FOR_FILES,
-        matcher=arguments.matcher,
-        preset=arguments.preset,
-        codec=arguments.codec,
-        **others,
+        **{name: getattr(arguments, name) for name in CODING}, speed=arguments.speed or FOR_FILES, **others
     )
     Encoder(array, config).flush()
     return config

@@ -13,7 +13,7 @@ from pathlib import Path
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.capture.manifest import read_calibration
-from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, add_output_options, bit_rate
+from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, add_output_options
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.encode_stream import (
     Unfinished,
@@ -35,6 +35,7 @@ from mvcodec.cli.progress import progress
 from mvcodec.cli.rig_option import add_rig, rectified_source
 from mvcodec.cli.safety import add_chunk_ms
 from mvcodec.cli.segment_options import add_segment, check_continues, plan
+from mvcodec.cli.setting_options import add_setting
 from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD
 from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.cli.time_options import add_time_options, timing_of
@@ -45,7 +46,9 @@ from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.speed_choice import FOR_LIVE
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.output.live_view import LiveView
+from mvcodec.settings import settings_of
 from mvcodec.synthesis.synthesizers import make_synthesizer
+from mvcodec.video.codec import RateControl
 
 SUFFIX = ".mcap"
 GIVEN = "given"
@@ -54,7 +57,6 @@ GIVEN = "given"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``encode``."""
-    default = EncoderConfig()
     add_input(
         parser,
         "an array folder, R*C videos in row order with --grid, a recording with --topics (an .mcap"
@@ -64,15 +66,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("output", type=local_path, metavar="OUT.mcap", help="or - for standard output")
     rate = parser.add_mutually_exclusive_group()
-    usual = f"(default: {default.rate.qp})"
-    rate.add_argument("--qp", type=int, metavar="N", help=f"constant QP, 1..51, av1 and vp9 1..63 {usual}")
-    rate.add_argument("--crf", type=float, metavar="N", help="constant rate factor")
-    rate.add_argument(
-        "--bitrate",
-        type=bit_rate,
+    add_setting(rate, RateControl, "qp", note=f" (default: {EncoderConfig().rate.qp})")
+    add_setting(rate, RateControl, "crf")
+    add_setting(
+        rate,
+        RateControl,
+        "bitrate_kbps",
         metavar="KBPS",
-        help="kbit/s of the pictures and maps of all cameras, with --enhance auto of the layer too;"
-        " 2M is 2000",
+        note=", with --enhance auto of the layer too; 2M is 2000",
     )
     rate.add_argument(
         "--target-psnr",
@@ -170,8 +171,8 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
         warnings.warn(text, MvCodecWarning, stacklevel=2)
     range_px = (
         source.disparity_range_px
-        if isinstance(source, DecodedSource) and arguments.disparity_range is None
-        else find_range(source, chosen, arguments.disparity_range, given)
+        if isinstance(source, DecodedSource) and arguments.disparity_range_px is None
+        else find_range(source, chosen, arguments.disparity_range_px, given)
     )
     if arguments.dry_run:
         print(plan(array, config, chosen, range_px))
@@ -261,6 +262,6 @@ def _config(array: CameraArray, arguments: argparse.Namespace) -> EncoderConfig:
         arguments.speed = FOR_LIVE
     if arguments.depth:
         require_calibration(array, arguments.nominal)
-    rates = {"qp": arguments.qp, "crf": arguments.crf, "bitrate_kbps": arguments.bitrate}
+    rates = {name: getattr(arguments, name) for name in settings_of(RateControl)}
     layer = layer_settings(arguments)
     return checked_config(array, arguments, **rates, **layer, depth=arguments.depth is not None)

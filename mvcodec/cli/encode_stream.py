@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO, get_args
+from typing import BinaryIO
 
 from mvcodec.array import CameraArray
 from mvcodec.capture.live_cameras import LiveCameras
@@ -17,30 +17,30 @@ from mvcodec.capture.manifest import read_calibration
 from mvcodec.capture.recording import Recording
 from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.cli.interrupt import deferred_interrupt
-from mvcodec.cli.live_options import PATIENCE, add_patience, is_live, live_cameras
+from mvcodec.cli.live_options import add_patience, is_live, live_cameras
 from mvcodec.cli.live_view_option import live_view
 from mvcodec.cli.picture_options import reading_of
 from mvcodec.cli.progress import progress
 from mvcodec.cli.rig_option import RectifiedStream, rectified_stream
+from mvcodec.cli.setting_options import add_setting
 from mvcodec.cli.standard_streams import INPUT_NAME, STANDARD, standard_input, standard_output
 from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.cli.time_options import timing_of
 from mvcodec.container import McapWriter
 from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.declared import DROPPED_KEY
-from mvcodec.container.recorded_pictures import Clock
 from mvcodec.decoding.decoded_source import is_own_file
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.live import LiveEncoding, WhenBehind
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet
 from mvcodec.output.live_view import LiveView
+from mvcodec.settings import settings_of
 
 SUFFIX = ".mcap"
 
-STREAM_OPTIONS = ("--topics", "--when-behind", "--clock", PATIENCE)
+STREAM_OPTIONS = ("--topics", "--when-behind", "--clock", "--patience")
 DEFAULT_WHEN_BEHIND: WhenBehind = "block"
-DEFAULT_CLOCK: Clock = "stamp"
 
 
 class Unfinished(MvCodecError):
@@ -61,11 +61,13 @@ def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
         help="where coding or the reader of OUT is too slow: leave frame sets out, or let INPUT wait"
         f" (default: {DEFAULT_WHEN_BEHIND})",
     )
-    group.add_argument(
-        "--clock",
-        choices=get_args(Clock),
-        help="the times that count: the pictures' own stamps, or when they were written down or arrived"
-        f" (default: {DEFAULT_CLOCK}; of live cameras: {DEFAULT_CLOCK} where they seem to have one clock)",
+    usual = settings_of(RecordingSettings)["clock"].default
+    add_setting(
+        group,
+        RecordingSettings,
+        "clock",
+        left_open=True,
+        note=f" (default: {usual}; of live cameras: {usual} where they seem to have one clock)",
     )
     add_patience(group)
 
@@ -114,7 +116,7 @@ def encode_stream(
     with live_view(arguments) as view, _opened(arguments) as source:
         straight = rectified_stream(source, arguments)
         config = make_config(straight.array)
-        span = arguments.disparity_range
+        span = arguments.disparity_range_px
         if isinstance(span, tuple):
             config = replace(config, disparity_range_px=span)
         if source.calibration_note and not straight.array.calibration.given:
@@ -171,7 +173,7 @@ def _opened(arguments: argparse.Namespace) -> Iterator[Recording | LiveCameras]:
         fps=timing.fps,
         tolerance_ms=timing.tolerance_ms,
         calibration=None if arguments.calibration is None else read_calibration(arguments.calibration),
-        clock=arguments.clock or DEFAULT_CLOCK,
+        clock=arguments.clock or settings_of(RecordingSettings)["clock"].default,
         offsets_ms=timing.offsets_ms,
         bits=arguments.bits,
     )

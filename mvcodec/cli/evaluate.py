@@ -97,7 +97,7 @@ def _evaluate(arguments: argparse.Namespace, stack: ExitStack) -> None:
     output: Path = arguments.output
     source = open_input(_inputs(arguments, stack), grid=arguments.grid, real=arguments.real)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
-    study = _study(source.array, arguments, find_range(source, chosen, arguments.disparity_range))
+    study = _study(source.array, arguments, find_range(source, chosen, arguments.disparity_range_px))
     facts = examine(source, chosen)
     store = PointStore(output / POINTS)
     with progress("evaluate", None, quiet=arguments.quiet, unit="picture") as bar:

@@ -6,26 +6,21 @@ import argparse
 from typing import Any
 
 from mvcodec.array import Position
-from mvcodec.cli.arguments import position
-from mvcodec.encoding.config import AUTO
+from mvcodec.cli.arguments import OPTIONS, position
+from mvcodec.cli.setting_options import add_setting
+from mvcodec.encoding.config import AUTO, EncoderConfig
+from mvcodec.settings import settings_of
 
 
 def add_layer(parser: argparse.ArgumentParser) -> None:
     """The options of the enhancement layer."""
+    add_setting(parser, EncoderConfig, "enhance", parse=_qp, metavar="QP|auto")
     parser.add_argument(
-        "--enhance",
-        type=_qp,
-        metavar="QP|auto",
-        help="add an enhancement layer: virtual views, whose originals INPUT must have, coded from their"
-        " synthesis with about the quality of this QP; the base stays as it is without. auto: what goes best"
-        " with the pictures' QP; beside --bitrate both together hold the rate",
-    )
-    parser.add_argument(
-        "--enhance-views",
+        OPTIONS["enhance_views"],
         type=position,
         nargs="+",
         metavar="R,C",
-        help="the views of the layer (default: every one that no real camera has)",
+        help=settings_of(EncoderConfig)["enhance_views"].help,
     )
 
 

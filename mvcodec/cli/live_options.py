@@ -11,11 +11,10 @@ from mvcodec.capture.live_address import is_live_address
 from mvcodec.capture.live_cameras import LiveCameras, LiveSettings
 from mvcodec.capture.manifest import read_calibration
 from mvcodec.cli.paths import local_path
+from mvcodec.cli.setting_options import add_setting
 from mvcodec.cli.time_options import timing_of
 from mvcodec.errors import SettingError
-
-PATIENCE = "--patience"
-DEFAULT_PATIENCE_S = 10.0
+from mvcodec.settings import settings_of
 
 
 def input_or_camera(text: str) -> Path | str:
@@ -37,13 +36,8 @@ def is_live(arguments: argparse.Namespace) -> bool:
 
 def add_patience(group: argparse._ArgumentGroup) -> None:
     """``--patience``."""
-    group.add_argument(
-        PATIENCE,
-        type=float,
-        metavar="S",
-        help="how long nothing may come from live cameras before encoding ends, seconds; until then they"
-        f" are opened again (default: {DEFAULT_PATIENCE_S:g})",
-    )
+    usual = settings_of(LiveSettings)["patience_s"].default
+    add_setting(group, LiveSettings, "patience_s", metavar="S", left_open=True, note=f" (default: {usual:g})")
 
 
 @contextmanager
@@ -62,6 +56,7 @@ def live_cameras(arguments: argparse.Namespace) -> Iterator[LiveCameras]:
     if arguments.grid is None and count > 1:
         raise SettingError("--grid", "nothing", f"RxC of {count} cameras in row order")
     timing = timing_of(arguments)
+    patience = {} if arguments.patience_s is None else {"patience_s": arguments.patience_s}
     settings = LiveSettings(
         addresses=tuple(arguments.input),
         grid=arguments.grid or (1, 1),
@@ -71,7 +66,7 @@ def live_cameras(arguments: argparse.Namespace) -> Iterator[LiveCameras]:
         calibration=None if arguments.calibration is None else read_calibration(arguments.calibration),
         clock=arguments.clock,
         offsets_ms=timing.offsets_ms,
-        patience_s=DEFAULT_PATIENCE_S if arguments.patience is None else arguments.patience,
+        **patience,
     )
     with closing(LiveCameras(settings)) as cameras:
         yield cameras

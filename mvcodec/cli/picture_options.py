@@ -8,18 +8,13 @@ import warnings
 from mvcodec.capture.reading import Reading
 from mvcodec.cli.arguments import pair_of_sizes
 from mvcodec.cli.safety import add_on_error
+from mvcodec.cli.setting_options import add_setting
 from mvcodec.errors import InputError, MvCodecWarning
 
 
 def add_picture_options(parser: argparse.ArgumentParser) -> None:
     """``--bits``, ``--split`` and ``--on-error``."""
-    parser.add_argument(
-        "--bits",
-        type=int,
-        metavar="N",
-        help="bits that pictures of 16 bits really use, 8..16 (default: as their files say, or as their"
-        " values need)",
-    )
+    add_setting(parser, Reading, "bits")
     parser.add_argument(
         "--split",
         type=pair_of_sizes,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections import deque
 from collections.abc import Iterable, Iterator
 from itertools import chain, repeat
@@ -25,6 +24,7 @@ from mvcodec.cli.info import count as counted
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.progress import progress, tell_written
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
+from mvcodec.cli.setting_options import add_setting
 from mvcodec.container import McapReader
 from mvcodec.container.limits import Limits
 from mvcodec.decoding.decoder import Decoder
@@ -64,26 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="viewpoint, in steps of the input's grid (default: middle); of a quilt or slice its row",
     )
     parser.add_argument("--style", choices=STYLES, default="mono", help="default: %(default)s")
-    parser.add_argument(
-        "--refocus",
-        type=_pixels,
-        metavar="PX",
-        help="disparity in focus, px for one step of the input's grid: the others blur, as through a lens as"
-        " large as the array",
-    )
-    parser.add_argument(
-        "--convergence",
-        type=_pixels,
-        metavar="PX",
-        help="disparity in the plane of the screen, px for one step, for pictures of several views"
-        " (default: the scene's median; eyes stand so that nothing is farther than 3%% of the width from it)",
-    )
-    parser.add_argument(
-        "--grid",
-        type=pair_of_sizes,
-        metavar="RxC",
-        help="views of a mosaic, quilt or refocused picture; 1xN: of an epipolar slice",
-    )
+    add_setting(parser, ShotSettings, "focus_px", metavar="PX")
+    add_setting(parser, ShotSettings, "convergence_px", metavar="PX")
+    add_setting(parser, ShotSettings, "grid", parse=pair_of_sizes, metavar="RxC")
     add_synthesizer(parser)
     add_matcher(parser)
     add_frames(parser, "frames of the file")
@@ -131,15 +114,15 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def _settings(first: DecodedSet, arguments: argparse.Namespace) -> ShotSettings:
-    return ShotSettings.of(first, arguments.grid, arguments.refocus, arguments.convergence)
+    return ShotSettings.of(first, arguments.grid, arguments.focus_px, arguments.convergence_px)
 
 
 def _check_settings(arguments: argparse.Namespace) -> None:
     """Refuse what cannot be done before any work is."""
-    if arguments.refocus is not None and arguments.style != "mono":
+    if arguments.focus_px is not None and arguments.style != "mono":
         expected = "--style mono; --convergence says what lies in the plane of the screen"
         raise SettingError("--refocus", f"with --style {arguments.style}", expected)
-    if arguments.convergence is not None and arguments.style == "mono":
+    if arguments.convergence_px is not None and arguments.style == "mono":
         raise SettingError("--convergence", "with --style mono", "a style of several views")
     output = arguments.output
     if Path(arguments.input).resolve() == output.resolve():
@@ -197,13 +180,3 @@ class _Counted:
             self.count += 1
             yield picture
             self._bar.update()
-
-
-def _pixels(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected a number of px")
-    return number

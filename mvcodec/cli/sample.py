@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from mvcodec.cli.arguments import add_output_options, pair_of_sizes, picture_size, positive_int
+from mvcodec.cli.arguments import add_output_options, pair_of_sizes, picture_size
 from mvcodec.cli.info import count
 from mvcodec.cli.paths import ARRAY_NAMES, add_overwrite, check_folder_target, local_path
 from mvcodec.cli.progress import progress
+from mvcodec.cli.setting_options import add_setting
 from mvcodec.output.scene_folder import make_sample, write_sample
 from mvcodec.scenes.rough_rig import FLAWS, RoughRigSettings
 from mvcodec.scenes.scene import DEFAULT_SCENE, SCENES, SceneSettings
@@ -22,19 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"one of {', '.join(SCENES)} (default: %(default)s)",
     )
-    parser.add_argument(
-        "--grid", type=pair_of_sizes, metavar="RxC", help="rows and columns of views (default: 5x5)"
-    )
-    parser.add_argument("--frames", type=positive_int, metavar="N", help="how many (default: 24)")
-    parser.add_argument(
-        "--size",
-        type=picture_size,
-        metavar="WxH",
-        help="of the pictures, px, or a word as 720p (default: 640x360)",
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="varies the scene (default: %(default)s)"
-    )
+    add_setting(parser, SceneSettings, "grid", parse=pair_of_sizes, metavar="RxC")
+    add_setting(parser, SceneSettings, "frames")
+    add_setting(parser, SceneSettings, "size", parse=picture_size, metavar="WxH", note=", or a word as 720p")
+    add_setting(parser, SceneSettings, "seed")
     parser.add_argument(
         "--rig",
         metavar="rough[:SEED][,only=FLAW,...]",

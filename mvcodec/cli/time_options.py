@@ -5,18 +5,14 @@ from __future__ import annotations
 import argparse
 import math
 
-from mvcodec.capture.timing import SYNCS, Timing
+from mvcodec.capture.timing import Timing
+from mvcodec.cli.setting_options import add_setting
 
 
 def add_time_options(parser: argparse.ArgumentParser) -> None:
     """``--fps``, ``--offset``, ``--sync`` and ``--tolerance-ms``."""
     group = parser.add_argument_group("time")
-    group.add_argument(
-        "--fps",
-        type=float,
-        metavar="N",
-        help="nominal frame rate, and that of files without times (default: from the times)",
-    )
+    add_setting(group, Timing, "fps")
     group.add_argument(
         "--offset",
         type=_offset,
@@ -25,17 +21,8 @@ def add_time_options(parser: argparse.ArgumentParser) -> None:
         metavar="CAMERA=MS",
         help="what to add to the times of a camera (rNN_cNN, its file or topic), ms; repeatable",
     )
-    group.add_argument(
-        "--sync",
-        choices=SYNCS,
-        help="estimate the offsets of files from what moves in their pictures, or from their sound tracks",
-    )
-    group.add_argument(
-        "--tolerance-ms",
-        type=float,
-        metavar="N",
-        help="how far apart pictures of one frame set may be taken (default: half of a frame's time)",
-    )
+    add_setting(group, Timing, "sync")
+    add_setting(group, Timing, "tolerance_ms")
 
 
 def timing_of(arguments: argparse.Namespace) -> Timing:

@@ -13,7 +13,7 @@ from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stream import DISPARITY_CAMERAS, DISPARITY_SCALES, PREDICTIONS, map_cameras
 from mvcodec.video.codec import PRESETS, RateControl, check_qp
-from mvcodec.video.codecs import find_codec
+from mvcodec.video.codecs import CODECS, find_codec
 from mvcodec.video.disparity_rate import (
     best_disparity_cameras,
     default_disparity_cameras,
@@ -56,22 +56,35 @@ class EncoderConfig:
 
     rate: RateControl = DEFAULT_RATE
     codec: str = setting(
-        "h264", "codec of the pictures and the maps; h264 is the one that viewers are sure to play"
+        "h264",
+        "codec of the pictures and the maps; h264 is the one that viewers are sure to play",
+        choices=tuple(CODECS),
     )
     gop: int | None = setting(
         None, "frame sets from keyframe to keyframe, at most one second's (default: one second)", low=1
     )
     speed: str = setting(
-        FOR_FILES, "how much time coding may take: sets matcher and preset together", choices=tuple(SPEEDS)
+        FOR_FILES,
+        "how much time coding may take: sets `matcher` and `preset` together",
+        choices=tuple(SPEEDS),
     )
-    matcher: str | Matcher | None = None
-    preset: str | None = setting(
-        None, "effort of the video encoder (default: what the speed has)", choices=PRESETS
-    )
-    disparity_range_px: tuple[float, float] | None = None
-    disparity_qp: int | None = setting(
+    matcher: str | Matcher | None = setting(
         None,
-        "constant quantiser of the maps (default: chosen for that of the pictures)",
+        f"what estimates the disparity maps (default: what `speed` has; {FOR_FILES}:"
+        f" {SPEEDS[FOR_FILES].matcher})",
+    )
+    preset: str | None = setting(
+        None,
+        f"effort of the video encoder (default: what `speed` has; {FOR_FILES}: {SPEEDS[FOR_FILES].preset})",
+        choices=PRESETS,
+    )
+    disparity_range_px: tuple[float, float] | None = setting(
+        None,
+        "the least and the greatest disparity between neighbouring real cameras, px (default: estimated from"
+        " the pictures, within what the input states)",
+    )
+    disparity_qp: int | None = setting(
+        None, "constant quantiser of the maps (default: chosen for that of the pictures)"
     )
     disparity_scale: int | None = setting(
         None,
@@ -80,26 +93,31 @@ class EncoderConfig:
     )
     disparity_cameras: str | None = setting(
         None,
-        "the real cameras that send a map: all; alternate: every second one, and decoders derive the others';"
-        " none: decoders estimate all maps (beside predicted pictures some are sent, for prediction alone);"
-        " auto: what costs fewest bits at equal quality (default: all or"
-        " alternate, chosen for the pictures' quantiser)",
+        "the real cameras that send a map; alternate: every second one, and decoders derive the others';"
+        " none: decoders estimate all maps, which takes them as long as it takes encoders (beside predicted"
+        " pictures some are sent, for prediction alone), and readers of format version 1 refuse the file;"
+        " auto: what costs fewest bits at equal quality (default: all or alternate, chosen for the pictures'"
+        " quantiser)",
         choices=(*DISPARITY_CAMERAS, AUTO),
     )
     prediction: str = setting(
         "none",
-        "synthesis: real cameras are coded from each other, for fewer bits; the first one plays alone",
+        "synthesis: real cameras are coded from each other, for fewer bits; the first one alone plays in any"
+        " viewer, and readers of format version 1 refuse the file",
         choices=PREDICTIONS,
     )
     enhance: int | str | None = setting(
         None,
-        "QP of an enhancement layer: views whose originals are there, coded from their synthesis;"
-        " auto: chosen for the pictures' quantiser, or so that base and layer together hold the bit rate",
+        "add an enhancement layer: virtual views whose originals are in the input, coded from their synthesis"
+        " with about the quality of this QP; the base stays as it is without. auto: what goes best with the"
+        " pictures' quantiser; beside a bit rate both together hold it",
     )
-    enhance_views: tuple[Position, ...] | None = None
+    enhance_views: tuple[Position, ...] | None = setting(
+        None, "the views of the layer (default: every one that no real camera has)"
+    )
     disparity_median: int | None = setting(
         None,
-        "smooth maps over N x N before coding, N odd; 0: don't (default: 5, at half size 3)",
+        "smooth maps over N x N before coding (default: 5, at half size 3)",
         choices=(0, *range(3, WIDEST_MEDIAN + 1, 2)),
         expected=f"0 (off) or an odd number, 3..{WIDEST_MEDIAN}",
     )

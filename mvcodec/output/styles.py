@@ -18,6 +18,7 @@ from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.output import light_field, stereoscopic
 from mvcodec.output.mosaic import mosaic
+from mvcodec.settings import check_settings, setting
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.workers import Job, submit
 
@@ -52,20 +53,30 @@ class ShotSettings:
         eye_steps: distance of two eyes in steps of its grid.
         median_px: a disparity in the middle of the scene, px for one step.
         extremes_px: those of what is far and near, px for one step.
-        grid: (rows, cols) of views, or None for the style's own.
-        focus_px: the disparity in focus, px for one step, or None.
-        convergence_px: the disparity in the plane of the screen, px for one step; None: the middle one.
+        grid, focus_px, convergence_px: explained by their fields; None: the style's own, none, the median.
     """
 
     array: CameraArray
     eye_steps: float
     median_px: float
     extremes_px: tuple[float, float]
-    grid: Grid | None = None
-    focus_px: float | None = None
-    convergence_px: float | None = None
+    grid: Grid | None = setting(
+        None, "views of a mosaic, quilt or refocused picture; 1xN: of an epipolar slice"
+    )
+    focus_px: float | None = setting(
+        None,
+        "disparity in focus, px for one step of the input's grid: the others blur, as through a lens as"
+        " large as the array",
+    )
+    convergence_px: float | None = setting(
+        None,
+        "disparity in the plane of the screen, px for one step, for pictures of several views (default: the"
+        f" scene's median; eyes stand so that nothing is farther than {STEREO_SHARE:.0%} of the width from"
+        " it)",
+    )
 
     def __post_init__(self) -> None:
+        check_settings(self)
         if self.grid is not None and self.grid[0] * self.grid[1] > MAX_VIEWS:
             raise SettingError(
                 "grid", f"{self.grid[0]}x{self.grid[1]}", f"{MAX_VIEWS} views in one picture at most"

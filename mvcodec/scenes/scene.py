@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from mvcodec.scenes.renderer import LitScene, Matrix, Optics
 from mvcodec.scenes.room import FLOOR_FROM_M, FLOOR_M, LIGHTING, NEAREST_M, WALL_M, Room
 from mvcodec.scenes.solids import Vector
 from mvcodec.scenes.textures import photographs
+from mvcodec.settings import check_settings, setting, settings_of
 
 ROOM_FPS = 24.0
 # Of the whole rig, whatever its grid: 20 px of disparity between its ends at the wall, at a width of 640.
@@ -29,34 +30,41 @@ _TALLEST = 4
 _LIT_FRAMES = 2
 
 
+def _by(pair: tuple[int, int] | None) -> str:
+    return "nothing" if pair is None else f"{pair[0]}x{pair[1]}"
+
+
 @dataclass(frozen=True, slots=True)
 class SceneSettings:
-    """What is asked of a scene; None takes the scene's own.
-
-    Attributes:
-        grid: (rows, cols).
-        frames: how many.
-        size: (width, height), px.
-        seed: of what a scene leaves to chance.
+    """What is asked of a scene; None takes the scene's own. Each is explained by its field.
 
     Raises:
         SettingError: a value is outside its range.
     """
 
-    grid: tuple[int, int] | None = None
-    frames: int | None = None
-    size: tuple[int, int] | None = None
-    seed: int = 0
+    grid: tuple[int, int] | None = setting(
+        None,
+        f"(rows, cols) of views (default: {_by(_ROOM_GRID)}, of a pair 1x2)",
+        expected=f"RxC, each 1..{MAX_GRID_SIDE}",
+    )
+    frames: int | None = setting(
+        None, f"how many (default: {_ROOM_FRAMES}, of a pair 1)", low=1, high=MAX_FRAMES
+    )
+    size: tuple[int, int] | None = setting(
+        None,
+        f"(width, height) of the pictures, px (default: {_by(_ROOM_SIZE)}, or that of the photographs)",
+        expected=f"WxH px, each {_MIN_SIDE}..{MAX_PICTURE_SIDE}",
+    )
+    seed: int = setting(0, "of what a scene leaves to chance", low=0)
 
     def __post_init__(self) -> None:
+        check_settings(self)
+        cls: Any = type(self)
+        known = settings_of(cls)
         if self.grid is not None and not all(1 <= side <= MAX_GRID_SIDE for side in self.grid):
-            raise SettingError("grid", _by(self.grid), f"RxC, each 1..{MAX_GRID_SIDE}")
-        if self.frames is not None and not 1 <= self.frames <= MAX_FRAMES:
-            raise SettingError("frames", self.frames, f"1..{MAX_FRAMES}")
+            raise SettingError("grid", _by(self.grid), known["grid"].allowed)
         if self.size is not None and not all(_MIN_SIDE <= side <= MAX_PICTURE_SIDE for side in self.size):
-            raise SettingError("size", _by(self.size), f"WxH px, each {_MIN_SIDE}..{MAX_PICTURE_SIDE}")
-        if self.seed < 0:
-            raise SettingError("seed", self.seed, "a whole number from 0 on")
+            raise SettingError("size", _by(self.size), known["size"].allowed)
 
 
 class Scene(Protocol):
@@ -254,7 +262,3 @@ def make_scene(name: str, settings: SceneSettings | None = None) -> Scene:
 def _check_frame(frame: int, count: int) -> None:
     if not 0 <= frame < count:
         raise SettingError("frame", frame, f"0..{count - 1}")
-
-
-def _by(pair: tuple[int, int] | None) -> str:
-    return "nothing" if pair is None else f"{pair[0]}x{pair[1]}"

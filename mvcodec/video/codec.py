@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvcodec.errors import SettingError
+from mvcodec.settings import check_settings, setting
 from mvcodec.stream import TrackKind
 from mvcodec.video.access_unit import UnitReader, UnitWords
 from mvcodec.video.map_model import MapModel
@@ -47,22 +49,32 @@ class Planes:
     v: Plane
 
 
+def _bit_rate(text: str) -> float:
+    """kbit/s: ``2000``, ``2000k`` or ``2M``."""
+    match = re.fullmatch(r"(-?\d+(?:\.\d+)?)([kM]?)(?:bit/s|bps)?", text)
+    if match is None:
+        raise SettingError("bitrate_kbps", text, "kbit/s such as 2000, or 2M")
+    return float(match[1]) * (1000 if match[2] == "M" else 1)
+
+
 @dataclass(frozen=True, slots=True)
 class RateControl:
-    """How a track's bits are governed; exactly one of the three is set.
-
-    Attributes:
-        qp: constant quantiser, from 1 on, on the codec's own scale.
-        crf: constant quality, from 1 on, on the codec's own scale.
-        bitrate_kbps: average bit rate, kbit/s.
+    """How a track's bits are governed; exactly one of the three is set. Each is explained by its field.
 
     Raises:
         SettingError: none or several are set, or one is outside the range of every codec.
     """
 
-    qp: int | None = None
-    crf: float | None = None
-    bitrate_kbps: float | None = None
+    qp: int | None = setting(None, "constant quantiser, 1..51; of av1 and vp9 1..63")
+    crf: float | None = setting(None, "constant quality (constant rate factor), on the scale of qp")
+    bitrate_kbps: float | None = setting(
+        None,
+        "average bit rate of all that is coded, kbit/s",
+        low=1,
+        high=10_000_000,
+        expected="1..10000000 kbit/s",
+        parse=_bit_rate,
+    )
 
     def __post_init__(self) -> None:
         given = [name for name in ("qp", "crf", "bitrate_kbps") if getattr(self, name) is not None]
@@ -70,8 +82,7 @@ class RateControl:
             found = " and ".join(given) or "none of them"
             raise SettingError("qp, crf, bitrate_kbps", found, "exactly one of the three")
         self.check_scale(WIDEST_SCALE)
-        if self.bitrate_kbps is not None and not 1 <= self.bitrate_kbps <= 10_000_000:
-            raise SettingError("bitrate_kbps", self.bitrate_kbps, "1..10000000 kbit/s")
+        check_settings(self)
 
     def check_scale(self, max_qp: int) -> None:
         """Raise SettingError where qp or crf is outside a codec's scale."""

@@ -1,0 +1,75 @@
+"""Options made from the fields of settings: name, type, range, default and help stand there alone."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Any
+
+from mvcodec.cli.arguments import OPTIONS, in_options
+from mvcodec.errors import SettingError
+from mvcodec.settings import Setting, did_you_mean, settings_of, show
+
+MOST_SHOWN = 5
+"""How many choices stand in a usage line; more are listed in the help."""
+
+
+def add_setting(
+    group: argparse._ActionsContainer,
+    settings: type,
+    name: str,
+    *,
+    parse: Callable[[str], Any] | None = None,
+    metavar: str | None = None,
+    left_open: bool = False,
+    note: str = "",
+) -> None:
+    """Add the option of one setting, which is called as `OPTIONS` says.
+
+    Args:
+        group: a parser or a group of its options.
+        settings: the dataclass that the setting is a field of.
+        name: of the field, and of what the parser gives for it.
+        parse: text to value, where the command line takes other words than the library.
+        metavar: what stands for the value; by default made from the choices or the type.
+        left_open: what counts where the option is not given is the command's to say, in `note`.
+        note: what only the command line has to say of it, before the default.
+    """
+    known = settings_of(settings)[name]
+    given = None if known.choices is None else [show(choice) for choice in known.choices]
+    shown = given is not None and len(given) <= MOST_SHOWN
+    meaning, sign, default = known.help.partition(" (default: ")
+    if metavar is None and not shown and (given is not None or None not in (known.low, known.high)):
+        meaning += f", {known.allowed.removeprefix('a whole number, ').removeprefix('a number, ')}"
+    if not left_open and known.default is not None:
+        sign, default = " (default: ", f"{show(known.default)})"
+    group.add_argument(
+        OPTIONS[name],
+        dest=name,
+        type=reader(known, parse),
+        default=None if left_open else known.default,
+        metavar=metavar or ("|".join(given or ()) if shown else _kind(known)),
+        help=in_options(meaning + note + sign + default).replace("%", "%%"),
+    )
+
+
+def reader(known: Setting, parse: Callable[[str], Any] | None = None) -> Callable[[str], Any]:
+    """What argparse calls with the text of an option: the value, checked against the setting."""
+
+    def read(text: str) -> Any:
+        try:
+            value = (parse or known.parsed)(text)
+        except SettingError as error:
+            raise argparse.ArgumentTypeError(f"found {text!r}, expected {error.expected}") from None
+        try:
+            known.check(value)
+        except SettingError as error:
+            guess = did_you_mean(text, map(str, known.choices or ()))
+            raise argparse.ArgumentTypeError(f"found {text}, expected {error.expected}{guess}") from None
+        return value
+
+    return read
+
+
+def _kind(known: Setting) -> str:
+    return "N" if known.type in (int, float) else "NAME"
