@@ -1,6 +1,6 @@
 """How fast: the encoder, matching, views and decoding over stock code on the same pictures in the same run.
 
-    python benchmarks/speed.py [--json] [--rows encoding,matching,memory,views,decoding,delay]
+    python benchmarks/speed.py [--json] [--rows encoding,matching,memory,views,decoding,delay] [--threads N]
 
 Both sides of a row take turns; the least time of each counts, so that other work on the machine matters
 little. Two threads; the stock match has one. The material is the sample scene, rendered in memory.
@@ -20,11 +20,11 @@ import cv2
 import numba
 import numpy as np
 from speed_encoding import MEMORY_RANGE, MEMORY_SIZE, encoding_rows, matching_rows, peak_mib
-from speed_measures import THREADS, Row
+from speed_measures import Row
 from speed_viewing import decoding_rows, delay_row, viewing_rows
 
 import mvcodec
-from mvcodec.workers import set_threads
+from mvcodec.workers import set_threads, thread_count
 
 MEMORY_GOALS = 1536, 1024
 KINDS = ("encoding", "matching", "memory", "views", "decoding", "delay")
@@ -39,7 +39,7 @@ def machine() -> dict[str, str | int]:
     return {
         "processor": name or platform.processor(),
         "cores": os.cpu_count() or 0,
-        "threads": THREADS,
+        "threads": thread_count(),
         "python": platform.python_version(),
         "mvcodec": mvcodec.__version__,
         "numpy": np.__version__,
@@ -68,11 +68,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--rows", default=",".join(KINDS), metavar="A,B", help=f"of {', '.join(KINDS)}")
+    parser.add_argument("--threads", type=int, metavar="N", help="default: one for each core")
     arguments = parser.parse_args()
     kinds = arguments.rows.split(",")
     if not set(kinds) <= set(KINDS):
         parser.error(f"--rows: found {arguments.rows}, expected some of {', '.join(KINDS)}")
-    set_threads(THREADS)
+    set_threads(arguments.threads)
     stream = sys.stderr if arguments.json else sys.stdout
     print(f"{'work':72}   ours ms  stock ms     (CPU     CPU)  ratio  must   aim", file=stream)
     rows = []

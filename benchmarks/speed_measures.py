@@ -21,8 +21,8 @@ from mvcodec.stream import TrackKind
 from mvcodec.video.codec import Planes, RateControl, VideoSettings
 from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import even_size, to_planes
+from mvcodec.workers import thread_count
 
-THREADS = 2
 REPEATS = 9
 FRAMES = 12
 QP = 27
@@ -147,7 +147,7 @@ def stock_code(made: Material, preset: str) -> Callable[[], object]:
         encoder.flush()
 
     def code_all() -> None:
-        with ThreadPoolExecutor(THREADS) as pool:
+        with ThreadPoolExecutor(thread_count()) as pool:
             list(pool.map(code, tracks))
 
     return code_all

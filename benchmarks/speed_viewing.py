@@ -12,7 +12,7 @@ from pathlib import Path
 
 import av
 from av.video.codeccontext import VideoCodecContext
-from speed_measures import QP, THREADS, Material, Row, bicubic, material, take_turns
+from speed_measures import QP, Material, Row, bicubic, material, take_turns
 
 from mvcodec.array import Viewpoint
 from mvcodec.container import McapWriter
@@ -21,6 +21,7 @@ from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.frames import DecodedSet
 from mvcodec.stream import Packet
 from mvcodec.synthesis.synthesizers import make_synthesizer
+from mvcodec.workers import thread_count
 
 VIEWS = {"layered": (3.5, 2.5), "quick": (1.6, 1.2)}
 
@@ -32,7 +33,7 @@ def _decoded(made: Material) -> DecodedSet:
 
 
 def _packets(made: Material, frames: int) -> list[list[Packet]]:
-    config = EncoderConfig(qp=QP, speed="balanced", disparity_range_px=made.range_px, threads=THREADS)
+    config = EncoderConfig(qp=QP, speed="balanced", disparity_range_px=made.range_px)
     with Encoder(made.array, config) as encoder:
         return [encoder.push(frame_set) for frame_set in made.frame_sets[:frames]]
 
@@ -95,10 +96,12 @@ def decoding_rows() -> Iterator[Row]:
         context.decode(None)
 
     def theirs() -> None:
-        with ThreadPoolExecutor(THREADS) as pool:
+        with ThreadPoolExecutor(thread_count()) as pool:
             list(pool.map(decode, units.values()))
 
-    yield take_turns("decode / PyAV alone, 2 threads", ours, theirs, (1.3, 1.15), units=len(packets))
+    yield take_turns(
+        f"decode / PyAV alone, {thread_count()} threads", ours, theirs, (1.3, 1.15), units=len(packets)
+    )
 
 
 def delay_row() -> Row:

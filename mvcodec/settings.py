@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from enum import Enum
 from functools import cache
 from types import NoneType, UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from mvcodec.errors import SettingError
 
@@ -130,6 +130,8 @@ class Setting:
                 return self.parse(text)
             if self.type is bool:
                 return BOOLS[text.lower()]
+            if self.type is object or get_origin(self.type) is Literal:
+                return text
             return self.type(text)
         except (ValueError, KeyError) as error:
             if isinstance(error, SettingError):

@@ -166,7 +166,7 @@ def test_words_that_everyone_uses_are_understood() -> None:
     encode = command_parser("encode")
     parsed = encode.parse_args(["in", "o.mcap", "--codec", "H265", "--bitrate", "2.5M"])
     assert (parsed.codec, parsed.bitrate_kbps) == ("hevc", 2500)
-    assert encode.parse_args(["in", "o.mcap", "--bitrate", "800k"]).bitrate == 800
+    assert encode.parse_args(["in", "o.mcap", "--bitrate", "800k"]).bitrate_kbps == 800
     assert command_parser("sample").parse_args(["out", "--size", "1080p"]).size == (1920, 1080)
 
 

@@ -44,8 +44,8 @@ from mvcodec.scenes.scene import SceneSettings
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codec import RateControl
+from mvcodec.workers import thread_count
 
-THREADS = 2
 FRAMES = 8
 """Of the sample scene: a third of a second, so that the whole takes less than two minutes on two cores."""
 
@@ -154,7 +154,7 @@ def command(*arguments: object) -> int:
 def decode_and_measure(
     source: ArraySource, coded: Path, synthesizer: Synthesizer, video: Path
 ) -> tuple[Comparison, Shown]:
-    """Synthesise every view of every frame set on both cores, measure it, write the mosaic.
+    """Synthesise every view of every frame set on all cores, measure it, write the mosaic.
 
     Returns:
         The figures over all frame sets, and the frame set in the middle.
@@ -165,7 +165,7 @@ def decode_and_measure(
     with (
         Decoder.open(coded) as decoder,
         ExitStack() as outputs,
-        ThreadPoolExecutor(THREADS) as pool,
+        ThreadPoolExecutor(thread_count()) as pool,
         progress("synthesise", source.frame_count) as bar,
     ):
         writer = None

@@ -36,6 +36,7 @@ from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import even_size, grey_planes, to_planes
 from mvcodec.video.disparity_code import quantise
 from mvcodec.video.map_size import MEDIANS, coded_size, to_coded
+from mvcodec.workers import thread_count
 
 RATIOS = {
     "view": "one virtual view / one bicubic cv2.remap",
@@ -45,7 +46,6 @@ RATIOS = {
 }
 REPEATS = 7
 FRAMES = 8
-THREADS = 2
 QP = 27
 
 Times = tuple[float, float]
@@ -188,7 +188,7 @@ def _encode(material: Material) -> Times:
             encoder.push(planes, keyframe=number % track[0].gop == 0)
         encoder.flush()
 
-    with ThreadPoolExecutor(THREADS) as pool:
+    with ThreadPoolExecutor(thread_count()) as pool:
         return _alternate(lambda: _push_all(material), lambda: list(pool.map(code, tracks)))
 
 
@@ -210,5 +210,5 @@ def _decode(path: Path, packets: Sequence[Sequence[Packet]]) -> Times:
             context.decode(av.Packet(data))
         context.decode(None)
 
-    with ThreadPoolExecutor(THREADS) as pool:
+    with ThreadPoolExecutor(thread_count()) as pool:
         return _alternate(ours, lambda: list(pool.map(decode, units.values())))

@@ -16,6 +16,7 @@ NEGATIVE_VALUES = ("--convergence", "--disparity-range", "--frames", "--max-dept
 
 OPTIONS = {
     "viewpoint": "--view",
+    "when_behind": "--when-behind",
     "synthesizer": "--synthesizer",
     "grid": "--grid",
     "frames": "--frames",

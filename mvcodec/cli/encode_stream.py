@@ -39,7 +39,7 @@ from mvcodec.settings import settings_of
 
 SUFFIX = ".mcap"
 
-STREAM_OPTIONS = ("--topics", "--when-behind", "--clock", "--patience")
+STREAM_SETTINGS = ("topics", "when_behind", "clock", "patience_s")
 DEFAULT_WHEN_BEHIND: WhenBehind = "block"
 
 
@@ -91,13 +91,13 @@ def is_stream(arguments: argparse.Namespace) -> bool:
 
 def refuse_stream_options(arguments: argparse.Namespace) -> None:
     """Raise SettingError for an option that only recordings and streams have, and the input is none."""
-    for option in STREAM_OPTIONS:
-        found = getattr(arguments, option.removeprefix("--").replace("-", "_"))
+    for name in STREAM_SETTINGS:
+        found = getattr(arguments, name)
         if found is not None:
             expected = (
                 f"no such option: {arguments.input[0]} is no recording, live camera, {SUFFIX} file or -"
             )
-            raise SettingError(option, found, expected)
+            raise SettingError(name, found, expected)
 
 
 def open_target(arguments: argparse.Namespace, view: LiveView | None) -> McapWriter:

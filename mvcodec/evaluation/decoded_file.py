@@ -14,8 +14,7 @@ from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import InputError
 from mvcodec.frames import DecodedSet, DisparityMap, FrameSet, Picture
 from mvcodec.synthesis.synthesizer import Synthesizer
-
-THREADS = 2
+from mvcodec.workers import thread_count
 
 
 class DecodedFile:
@@ -69,7 +68,7 @@ class DecodedFile:
         places = tuple(self.array.real if views is None else views)
         with (
             Decoder.open(self.path, slice(chosen.start, chosen.stop)) as decoder,
-            ThreadPoolExecutor(THREADS, "render") as pool,
+            ThreadPoolExecutor(thread_count(), "render") as pool,
         ):
             for decoded in decoder:
                 pictures = pool.map(partial(self._render, decoded), places)

@@ -24,9 +24,10 @@ from mvcodec.player.originals import Originals
 from mvcodec.player.session import PictureRequest
 from mvcodec.player.synthesizer_pool import SynthesizerPool
 from mvcodec.synthesis.synthesizer import Preparing, Synthesizer
+from mvcodec.workers import thread_count
 
-PICTURES_AT_ONCE = 2
-"""More would wait for each other: each picture is made by all threads of the process."""
+MOST_AT_ONCE = 2
+"""More pictures would wait for each other: each is made by all threads of the process."""
 
 JPEG_QUALITY = 90
 
@@ -49,7 +50,7 @@ class MadePicture:
 
 
 class PictureMaker:
-    """Makes pictures of one file, in as many as `PICTURES_AT_ONCE`.
+    """Makes pictures of one file, `at_once` of them.
 
     Args:
         path: the file.
@@ -60,6 +61,7 @@ class PictureMaker:
 
     Attributes:
         store: the file's frame sets.
+        at_once: how many pictures may be asked for at the same time.
         levels: at which pictures can be made.
         originals: to measure against; None at first.
 
@@ -77,9 +79,10 @@ class PictureMaker:
     ) -> None:
         self.store = FrameStore(path, limits=limits, matcher=matcher)
         self.originals: Originals | None = None
+        self.at_once = min(thread_count(), MOST_AT_ONCE)
         self.levels = SMALLER if make_quick is None else QUICKER
-        self._synthesizers = SynthesizerPool(make_synthesizer, PICTURES_AT_ONCE + 1)
-        self._quick = SynthesizerPool(make_quick or make_synthesizer, PICTURES_AT_ONCE + 1)
+        self._synthesizers = SynthesizerPool(make_synthesizer, self.at_once + 1)
+        self._quick = SynthesizerPool(make_quick or make_synthesizer, self.at_once + 1)
         self._drafts = _Drafts()
         self._ahead = ThreadPoolExecutor(1, "ahead")
         self._coming: tuple[int, Future[None]] | None = None
@@ -189,7 +192,7 @@ class _Drafts:
     """The frame sets shrunk last; synthesizers know by identity what they have prepared."""
 
     def __init__(self) -> None:
-        self._held: deque[tuple[DecodedSet, float, DecodedSet]] = deque(maxlen=PICTURES_AT_ONCE + 2)
+        self._held: deque[tuple[DecodedSet, float, DecodedSet]] = deque(maxlen=MOST_AT_ONCE + 2)
         self._lock = threading.Lock()
 
     def of(self, decoded: DecodedSet, scale: float) -> DecodedSet:

@@ -25,7 +25,7 @@ from mvcodec.errors import InputError, MvCodecError
 from mvcodec.player.access import AccessRules
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.messages import parse_message
-from mvcodec.player.picture_maker import PICTURES_AT_ONCE, MadePicture, PictureMaker
+from mvcodec.player.picture_maker import MadePicture, PictureMaker
 from mvcodec.player.session import PictureRequest, Session
 
 MAX_VIEWERS = 32
@@ -129,7 +129,7 @@ class _Viewers:
     def __init__(self, broadcast: Broadcast) -> None:
         self._broadcast = broadcast
         self._count = 0
-        self._pool = ThreadPoolExecutor(PICTURES_AT_ONCE, "picture")
+        self._pool = ThreadPoolExecutor(broadcast.maker.at_once, "picture")
 
     async def serve(self, socket: WebSocket) -> None:
         """One viewer, from the handshake to the end."""

@@ -27,13 +27,13 @@ from mvcodec.synthesis.dils import Dils, DilsSettings
 from mvcodec.synthesis.linear import Linear, LinearSettings
 from mvcodec.synthesis.mlvs import Route
 from mvcodec.synthesis.synthesizer import Synthesizer
+from mvcodec.workers import thread_count
 from thesis.lines import BETAS, LINES, SPANS, Line
 from thesis.thesis_figures import LayerFigures, Step, ThesisTables, ViewFigures, no_step
 
 FOLDER = "shop_17x17"
 LEVELS = (1, 2, 3)
 THESIS_METHOD, THESIS_METHOD_WITH_HOLES, THESIS_ROUTE = "DILS", "DILS, holes left", Route.LEFT_RIGHT
-THREADS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,7 +243,7 @@ def _measure_cell(cell: _Cell, lines: Sequence[Line], thesis: ThesisTables, step
         return rows
 
     found = []
-    with ThreadPoolExecutor(THREADS) as pool:
+    with ThreadPoolExecutor(thread_count()) as pool:
         for rows in pool.map(measure, jobs):
             found += rows
             step()
