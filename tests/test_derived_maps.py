@@ -16,11 +16,12 @@ from mvcodec.array import CameraArray, Position
 from mvcodec.conformance.validation import validate
 from mvcodec.container import read_info
 from mvcodec.decoding.decoder import Decoder
-from mvcodec.decoding.derived_maps import derive_map
+from mvcodec.decoding.derived_maps import REACH, derive_map
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import DecodedSet, DisparityMap, FloatMap
-from mvcodec.kernels.map_projection import merge, project
+from mvcodec.kernels.map_projection import from_steps, merge, to_steps
+from mvcodec.kernels.view_depth import UNKNOWN, splat
 from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, map_cameras
 
 FAR_PX, NEAR_PX = -2.0, 9.0
@@ -28,30 +29,14 @@ TOP, LEFT, SIZE = 20, 30, 24
 """The near square, as camera (0, 0) sees it."""
 
 
-def plain_project(values: FloatMap, right: float, down: float) -> FloatMap:
-    """The twin of `project`: every source pixel on every place that it may take, sorted by nearness."""
-    out = np.full(values.shape, -np.inf, np.float32)
-    y, x = np.mgrid[: values.shape[0], : values.shape[1]]
-    to_x, to_y = x - right * values.astype(np.float64), y - down * values.astype(np.float64)
-    for across in (np.floor, np.ceil):
-        for along in (np.floor, np.ceil):
-            u, v = across(to_x).astype(int), along(to_y).astype(int)
-            inside = (u >= 0) & (u < values.shape[1]) & (v >= 0) & (v < values.shape[0])
-            np.maximum.at(out, (v[inside], u[inside]), values[inside])
-    return out
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    st.integers(0, 2**32 - 1),
-    st.tuples(st.integers(1, 12), st.integers(1, 12)),
-    st.sampled_from([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.25), (0.0, -1.0), (-1.0, 0.75), (0.0, 0.0)]),
-)
-def test_the_kernel_is_its_twin(seed: int, shape: tuple[int, int], step: tuple[float, float]) -> None:
-    values = (np.random.default_rng(seed).integers(-40, 41, shape) / 8).astype(np.float32)
-    found = np.full((shape[0] + 2, shape[1] + 2), np.nan, np.float32)
-    project(values, *step, found)
-    np.testing.assert_array_equal(found[1:-1, 1:-1], plain_project(values, *step))
+@pytest.mark.parametrize(("right", "down"), [(1.0, 0.0), (0.0, -1.0)])
+def test_whole_maps_have_no_cracks(right: float, down: float) -> None:
+    # A slanted wall: where the other camera sees it, its pixels stand 1.3 px apart.
+    rows, columns = np.mgrid[:40, :50]
+    slope = (0.3 * (rows if down else -columns)).astype(np.float32)
+    out = np.empty((42, 52), np.float32)
+    splat(slope, right, down, REACH, out)
+    assert (out[1:31, 1:31] > UNKNOWN).all()
 
 
 @settings(max_examples=20, deadline=None)
@@ -60,14 +45,25 @@ def test_the_merging_kernel_is_its_twin(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     # Eighths of a pixel: sums are exact.
     seen = (rng.integers(-40, 41, (count, 5, 7)) / 8).astype(np.float32)
-    seen[rng.random(seen.shape) < 0.3] = -np.inf
+    seen[rng.random(seen.shape) < 0.3] = UNKNOWN
     values, known = np.empty((5, 7), np.float32), np.empty((5, 7), np.bool_)
     merge(np.pad(seen, ((0, 0), (1, 1), (1, 1))), 2.0, values, known)
-    np.testing.assert_array_equal(known, np.isfinite(seen).any(axis=0))
+    np.testing.assert_array_equal(known, (seen > UNKNOWN).any(axis=0))
     for place in np.ndindex(5, 7):
         of_pixel = seen[(slice(None), *place)]
         agreeing = of_pixel[of_pixel > of_pixel.max() - 2] if known[place] else of_pixel[:1]
         assert values[place] == pytest.approx(agreeing.mean())
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.sampled_from([2.0**-10, 0.125]))
+def test_steps_are_their_twin(seed: int, width: int, step: float) -> None:
+    values = np.random.default_rng(seed).uniform(-20, 80, (3, width)).astype(np.float32)
+    steps, back = np.empty(values.shape, np.uint16), np.empty(values.shape, np.float32)
+    to_steps(values, -16.0, step, steps)
+    np.testing.assert_array_equal(steps, np.floor((values + 16) / step + 0.5).clip(0, 65535))
+    from_steps(steps, -16.0, step, back)
+    np.testing.assert_array_equal(back, steps * np.float32(step) - 16)
 
 
 def square(array: CameraArray, camera: Position) -> FloatMap:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO, Literal, get_args
@@ -15,7 +14,6 @@ from mvcodec.closing import Closing
 from mvcodec.container import McapReader
 from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
-from mvcodec.decoding.derived_maps import derive_map
 from mvcodec.decoding.enhanced_views import EnhancedViews, WaitingSet
 from mvcodec.decoding.estimated_maps import (
     MapsOnDemand,
@@ -24,20 +22,16 @@ from mvcodec.decoding.estimated_maps import (
     estimate_maps,
 )
 from mvcodec.decoding.on_demand import OnDemand
+from mvcodec.decoding.sent_maps import sent_maps
 from mvcodec.decoding.stand_in import fill_absent
+from mvcodec.decoding.tracks import Tracks
 from mvcodec.enhancement import LAYER_TRACK, EnhancementHeader
-from mvcodec.errors import MissingReference, MvCodecWarning, SettingError, StreamClosed, StreamError
+from mvcodec.errors import MvCodecWarning, SettingError, StreamClosed, StreamError
 from mvcodec.frames import DecodedSet, DisparityMap, Picture
 from mvcodec.stereo.matcher import Matcher
-from mvcodec.stream import Packet, PredictedCamera, StreamHeader, Track, TrackKind, view_name
-from mvcodec.synthesis.frame_prediction import FramePrediction
-from mvcodec.video.codec import Planes
-from mvcodec.video.codecs import find_codec
+from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, view_name
 from mvcodec.video.colour import to_picture
-from mvcodec.video.disparity_code import dequantise
-from mvcodec.video.map_size import enlarged, small_size, track_sizes
-from mvcodec.video.track import PredictedTrackDecoder, TrackDecoder
-from mvcodec.workers import Job, check_threads, settle, submit
+from mvcodec.workers import check_threads
 
 OnError = Literal["skip", "stop"]
 
@@ -79,8 +73,7 @@ class Decoder(Closing):
         self._on_error, self._limits, self._asked_matcher = on_error, limits, matcher
         self._matcher: Matcher | None = None
         self._header: StreamHeader | None = None
-        self._decoders: dict[Track, TrackDecoder] = {}
-        self._predicted: dict[Track, PredictedTrackDecoder] = {}
+        self._tracks = Tracks()
         self._absent: frozenset[Position] = frozenset()
         self._skipping = False
         check_threads(threads)
@@ -194,8 +187,7 @@ class Decoder(Closing):
             return self._push_header(packet)
         if packet.track.kind in (TrackKind.LAYER, TrackKind.ENHANCED):
             return self._push_layer(packet)
-        known = packet.track in self._decoders or packet.track in self._predicted
-        if not known or self._skipping:
+        if packet.track not in self._tracks or self._skipping:
             return []
         try:
             sets = self._assembler.push(packet)
@@ -231,20 +223,11 @@ class Decoder(Closing):
     def _start(self, header: StreamHeader) -> None:
         """Begin at a keyframe, with fresh decoders."""
         self._limits.check_header(header, self._name)
-        try:
-            codec = find_codec(header.codec)
-        except SettingError as error:
-            raise StreamError(self._name, f"codec {error.found}", error.expected) from None
-        sizes = track_sizes(header.array.width, header.array.height, header.disparity_scale)
+        tracks = Tracks(header, self._name)
         estimates = header.estimates_maps
         self._matcher = decoding_matcher(header, self._asked_matcher) if estimates else None
         self._header = header
-        self._decoders, self._predicted = {}, {}
-        for track in header.tracks:
-            if track.kind is TrackKind.PREDICTED:
-                self._predicted[track] = PredictedTrackDecoder(sizes[TrackKind.TEXTURE])
-            else:
-                self._decoders[track] = TrackDecoder(codec, sizes[track.kind])
+        self._tracks = tracks
         self._assembler.start(header.tracks)
         self._absent, self._skipping = frozenset(), False
         self._layer = None
@@ -297,7 +280,7 @@ class Decoder(Closing):
 
     def _decode(self, packets: PacketSet) -> list[DecodedSet]:
         """Decode a frame set; nothing, where no map can be had of any camera that is there."""
-        planes, reasons = self._planes(packets)
+        planes, reasons = self._tracks.decode(packets, self._assembler.label)
         array, span, first = self.header.array, self.header.disparity_range_px, packets.first
         self._tell_absent(reasons, first)
         there = [camera for camera in array.real if camera not in reasons]
@@ -312,7 +295,8 @@ class Decoder(Closing):
         )
         disparities: Mapping[Position, DisparityMap]
         if matcher is None:
-            disparities = self._sent_maps(planes, there, senders, pictures)
+            coded = {camera: planes[Track(TrackKind.DISPARITY, camera)] for camera in senders}
+            disparities = sent_maps(self.header, coded, pictures, there)
         else:
             find = partial(estimate_maps, array, pictures, span, matcher)
             disparities = MapsOnDemand(there, find)
@@ -325,75 +309,6 @@ class Decoder(Closing):
         self._waiting = WaitingSet(decoded, planes, first, {})
         return []
 
-    def _sent_maps(
-        self,
-        planes: Mapping[Track, Planes],
-        there: Sequence[Position],
-        senders: Sequence[Position],
-        pictures: Mapping[Position, Picture],
-    ) -> Mapping[Position, DisparityMap]:
-        """The maps of the cameras that are there: as sent, and of those that send none as derived."""
-        header = self.header
-        coded = {camera: planes[Track(TrackKind.DISPARITY, camera)] for camera in senders}
-        sent = OnDemand(coded, lambda camera, codes: _map(header, codes, pictures[camera]))
-
-        def known(camera: Position, _: None) -> DisparityMap:
-            if camera in coded:
-                return sent[camera]
-            return derive_map(header.array, sent, header.disparity_range_px, camera)
-
-        return OnDemand(dict.fromkeys(there), known)
-
-    def _planes(self, packets: PacketSet) -> tuple[dict[Track, Planes], dict[Position, StreamError]]:
-        """Decode every track. What is missing is a reason why its camera is absent; damage is raised."""
-        jobs: dict[Track, Job[Planes]] = {
-            track: submit(
-                self._decoders[track].push,
-                packet.data,
-                packet.keyframe,
-                self._assembler.label(packet),
-                packet.index,
-            )
-            for track, packet in packets.packets.items()
-            if track in self._decoders
-        }
-        settle(jobs.values())
-        planes: dict[Track, Planes] = {}
-        reasons: dict[Position, StreamError] = {}
-        for track in packets.missing:
-            (self._decoders.get(track) or self._predicted[track]).lost = True
-            label = self._assembler.label(replace(packets.first, track=track))
-            _note(reasons, track, StreamError(label, "no packet", "one for each track of a frame set"))
-        for track, job in jobs.items():
-            try:
-                planes[track] = job.result()
-            except MissingReference as error:
-                _note(reasons, track, error)
-        if self._predicted:
-            self._predict(packets, planes, reasons)
-        return planes, reasons
-
-    def _predict(
-        self, packets: PacketSet, planes: dict[Track, Planes], reasons: dict[Position, StreamError]
-    ) -> None:
-        """Decode the cameras that are predicted from others, one after the other."""
-        header = self.header
-        frame = FramePrediction(header, planes)
-        for each in header.predicted:
-            track = header.picture_track(each.camera)
-            packet = packets.packets.get(track)
-            if packet is None:
-                continue
-            whole = header.needed_tracks(each) <= planes.keys()
-            make = partial(_predictions, frame, each) if whole else None
-            try:
-                found = self._predicted[track].push(packet, self._assembler.label(packet), make)
-            except MissingReference as error:
-                _note(reasons, track, error)
-            else:
-                planes[track] = found
-                frame.add(each.camera, found)
-
     def _tell_absent(self, reasons: dict[Position, StreamError], first: Packet) -> None:
         for camera in sorted(reasons.keys() - self._absent):
             _warn(reasons[camera], f"; the others go on without camera {view_name(camera)}")
@@ -401,21 +316,6 @@ class Decoder(Closing):
             text = f"{self._name}: camera {view_name(camera)} is back at {first.time_ns / 1e9:.3f} s"
             warnings.warn(text, MvCodecWarning, stacklevel=2)
         self._absent = frozenset(reasons)
-
-
-def _map(header: StreamHeader, planes: Planes, picture: Picture) -> DisparityMap:
-    width, height = small_size(header.array.width, header.array.height, header.disparity_scale)
-    found = dequantise(planes.y[:height, :width], header.disparity_range_px)
-    return found if header.disparity_scale == 1 else enlarged(found.values_px, picture)
-
-
-def _predictions(frame: FramePrediction, predicted: PredictedCamera) -> list[Planes]:
-    return [frame.predict(predicted.camera, predicted.references)]
-
-
-def _note(reasons: dict[Position, StreamError], track: Track, error: StreamError) -> None:
-    assert track.camera is not None
-    reasons.setdefault(track.camera, error)
 
 
 def _warn(error: StreamError, more: str = "") -> None:

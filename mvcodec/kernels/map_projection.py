@@ -1,4 +1,4 @@
-"""Disparity maps as another camera sees them: forward mapping, the near ones in front."""
+"""Disparity maps of several cameras that were moved to one place, as one map."""
 
 from __future__ import annotations
 
@@ -6,49 +6,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvcodec.kernels.view_depth import UNKNOWN
+
 FloatMap = NDArray[np.float32]
 Mask = NDArray[np.bool_]
-
-
-@njit(cache=True, nogil=True)
-def project(values: FloatMap, right: float, down: float, out: FloatMap) -> None:
-    """Move each pixel (x, y) of disparity d to (x - right * d, y - down * d); the nearest stays.
-
-    Both whole places beside a fractional one take it, so that slanted surfaces get no cracks.
-
-    Args:
-        values: float32 (H, W), px.
-        out: float32 (H + 2, W + 2), C-contiguous, overwritten: the other camera's map with a border of
-            one pixel, in which whatever leaves the picture lands; -inf where nothing comes.
-    """
-    height, width = values.shape
-    stride = np.int32(width + 2)
-    flat = out.ravel()
-    flat[:] = -np.inf
-    places = np.empty(width, np.int32)
-    beside, below = np.empty(width, np.int32), np.empty(width, np.int32)
-    chosen = np.empty(width, np.int32)
-    for y in range(height):
-        row = values[y]
-        for x in range(width):  # vectorised: no branch
-            d = np.float64(row[x])
-            to_x = min(max(np.float64(x) - right * d, -1.0), np.float64(width)) + 1.0
-            to_y = min(max(np.float64(y) - down * d, -1.0), np.float64(height)) + 1.0
-            u, v = np.int32(to_x), np.int32(to_y)
-            places[x] = v * stride + u
-            beside[x] = to_x > u
-            below[x] = to_y > v
-        count = 0
-        for x in range(width):
-            d, place = row[x], np.uint32(places[x])
-            flat[place] = max(flat[place], d)
-            chosen[count] = x
-            count += (beside[x] | below[x]) != 0
-        for x in chosen[:count]:  # again where one of them is 0, which costs less than to ask
-            d, down_by = row[x], np.int32(below[x] * stride)
-            for step in (beside[x], down_by, np.int32(beside[x] + down_by)):
-                place = np.uint32(places[x] + step)
-                flat[place] = max(flat[place], d)
 
 
 @njit(cache=True, nogil=True)
@@ -56,9 +17,9 @@ def merge(seen: NDArray[np.float32], agreement: float, values: FloatMap, known: 
     """The nearest of several maps at each pixel, averaged with those that agree with it.
 
     Args:
-        seen: float32 (K, H + 2, W + 2), px, see `project`.
+        seen: float32 (K, H + 2, W + 2), px, see `view_depth.splat`.
         agreement: px; what is farther than the nearest by less agrees.
-        values: float32 (H, W) out; -inf where nothing is known.
+        values: float32 (H, W) out; UNKNOWN where nothing is known.
         known: bool (H, W) out.
     """
     count, height, width = len(seen), *values.shape
@@ -76,9 +37,30 @@ def merge(seen: NDArray[np.float32], agreement: float, values: FloatMap, known: 
         for k in range(count):
             row = seen[k, y + 1, 1:-1]
             for x in range(width):
-                agrees = row[x] > nearest[x] - within
+                agrees = (row[x] > nearest[x] - within) & (row[x] > UNKNOWN)
                 total[x] += row[x] if agrees else np.float32(0)
                 agreeing[x] += np.float32(1) if agrees else np.float32(0)
         for x in range(width):
             known[y, x] = agreeing[x] > 0
             values[y, x] = total[x] / agreeing[x] if agreeing[x] > 0 else nearest[x]
+
+
+@njit(cache=True, nogil=True)
+def to_steps(values: FloatMap, low: float, step: float, steps: NDArray[np.uint16]) -> None:
+    """Disparity as whole steps (px) from `low` on, float32 (H, W) to uint16 (H, W), kept within 0..65535."""
+    from_px, per_px = np.float32(low), np.float32(1 / step)
+    for y in range(values.shape[0]):
+        row, out = values[y], steps[y]
+        for x in range(row.size):  # vectorised
+            scaled = (row[x] - from_px) * per_px + np.float32(0.5)
+            out[x] = np.uint16(np.int32(min(max(scaled, np.float32(0)), np.float32(65535))))
+
+
+@njit(cache=True, nogil=True)
+def from_steps(steps: NDArray[np.uint16], low: float, step: float, values: FloatMap) -> None:
+    """The inverse of `to_steps`."""
+    from_px, by_px = np.float32(low), np.float32(step)
+    for y in range(values.shape[0]):
+        row, out = steps[y], values[y]
+        for x in range(row.size):
+            out[x] = np.float32(row[x]) * by_px + from_px

@@ -37,6 +37,7 @@ def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out
     height, width = disparity.shape
     by_x, by_y, spill = np.float32(shift_x), np.float32(shift_y), np.float32(1) - np.float32(reach)
     stride = np.int32(width + 2)
+    straight = by_x == 0 or by_y == 0
     flat = out.ravel()
     flat[:] = UNKNOWN
     places = np.empty(width, np.int32)
@@ -53,6 +54,13 @@ def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out
             places[x] = v * stride + u
             beside[x] = np.int32(part_x >= spill) - np.int32(part_x <= -spill)
             above[x] = (np.int32(part_y >= spill) - np.int32(part_y <= -spill)) * stride
+        if straight:
+            for x in range(width):
+                d, place = row[x], np.uint32(places[x])
+                other = np.uint32(places[x] + (beside[x] | above[x]))
+                flat[place] = max(flat[place], d)
+                flat[other] = max(flat[other], d)
+            continue
         count = 0
         for x in range(width):
             d, place = row[x], np.uint32(places[x])
