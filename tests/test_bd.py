@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from mvcodec.evaluation.bd import RatePoint, anchor_lead, compare_curves, curve_warnings, front
+from mvcodec.evaluation.bd import RatePoint, anchor_lead, compare_curves, curve_warnings, front, hull
 
 RATES = (100.0, 200.0, 400.0, 800.0)
 
@@ -138,3 +138,10 @@ def test_curves_that_cross_more_than_once_are_overtaken_at_the_last_crossing() -
     assert first[0] == 100
     assert 100 < first[1] < 200
     assert last == pytest.approx((lead.overtaking.kbps, 800))
+
+
+def test_a_hull_has_the_points_that_no_mixture_of_others_beats() -> None:
+    below = (math.sqrt(200.0) * 10, 33.4)  # half way between the second and the third is 33.5
+    points = [(100.0, 30.0), (100.0, 33.0), (1000.0 / 5, 34.0), (1000.0, 36.0), below, (90.0, 20.0)]
+    assert hull(points) == [(90.0, 20.0), (100.0, 33.0), (200.0, 34.0), (1000.0, 36.0)]
+    assert hull(points[:1]) == points[:1]

@@ -88,7 +88,7 @@ def test_every_view_is_virtual_where_the_folder_lists_no_real_ones(original: Pat
 
 def test_json_has_the_documented_form(original: Path, tmp_path: Path) -> None:
     document = run(original, write_decoded(tmp_path, range(5), real=REAL)).to_json()
-    metrics = ["psnr_y", "ssim", "temporal_psnr_y"]
+    metrics = ["psnr_y", "psnr_yuv", "ssim", "temporal_psnr_y"]
     assert list(document) == [*metrics, "views"]
     for metric in metrics:
         assert list(document[metric]) == ["all", "real", "virtual", "worst"]
@@ -138,9 +138,22 @@ def test_options_add_iv_psnr_and_maps_of_the_first_frame(original: Path, tmp_pat
     assert maps == ["r00_c00.png", "r00_c01.png", "r00_c02.png"]
     np.testing.assert_array_equal(read_picture(tmp_path / "m" / "n" / maps[2]), ssim_picture(*pairs[0]))
     text = succeeds(*options, "-y").splitlines()
-    assert text[0].split() == ["view", "kind", "Y-PSNR", "dB", "SSIM", "temporal", "dB", "IV-PSNR", "dB"]
-    figures = [document[metric]["worst"] for metric in ("psnr_y", "ssim", "temporal_psnr_y", "iv_psnr")]
-    assert text[-1].split() == ["worst", "view", *map("{:.{}f}".format, figures, (2, 4, 2, 2))]
+    assert text[0].split() == [
+        "view",
+        "kind",
+        "Y-PSNR",
+        "dB",
+        "YUV",
+        "dB",
+        "SSIM",
+        "temporal",
+        "dB",
+        "IV-PSNR",
+        "dB",
+    ]
+    metrics = ("psnr_y", "psnr_yuv", "ssim", "temporal_psnr_y", "iv_psnr")
+    figures = [document[metric]["worst"] for metric in metrics]
+    assert text[-1].split() == ["worst", "view", *map("{:.{}f}".format, figures, (2, 2, 4, 2, 2))]
     assert len({len(line) for line in text}) == 1, "columns stand below their titles"
 
 

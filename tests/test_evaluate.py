@@ -59,9 +59,9 @@ def test_report_has_the_documented_form(array: Path, measured: Path) -> None:
         assert len(curve["points"]) == 4
         for point in curve["points"]:
             assert point["kbps"] == pytest.approx(point["bits"] * 10.0 / 2 / 1000)
-            assert list(point["bits_split"]) == ["texture", "disparity", "rest"]
+            assert list(point["bits_split"]) == ["texture", "disparity", "rest", "enhancement"]
             assert sum(point["bits_split"].values()) == point["bits"]
-            for figures, top in ((point["psnr_y"], 60), (point["ssim"], 1)):
+            for figures, top in ((point["psnr_y"], 60), (point["psnr_yuv"], 60), (point["ssim"], 1)):
                 assert list(figures) == ["all", "real", "virtual", "worst"]
                 assert 0 < figures["worst"] <= figures["all"] < top
             assert point["encode_seconds"] > 0
@@ -100,6 +100,7 @@ def test_bits_of_our_own_curve_are_those_of_the_file_with_its_container(measured
             "texture": bits.texture,
             "disparity": bits.disparity,
             "rest": bits.other,
+            "enhancement": 0,
         }
 
 
@@ -288,6 +289,22 @@ def test_our_own_streams_in_another_codec(array: Path, tmp_path: Path, codec: st
         assert read_info(path).header.codec == codec
     h264 = [point["qp"] for point in document["curves"][2]["points"]]
     assert h264 == ([25, 29] if codec == "av1" else [30, 40])
+
+
+def test_with_a_layer_the_base_its_layer_and_their_hull_are_measured(array: Path, tmp_path: Path) -> None:
+    arguments = ("--qp", "24,38", "--enhance", "auto", "--anchors", "simulcast", "--anchor-codecs", "h264")
+    succeeds("evaluate", array, "--output", tmp_path, *arguments, *FAST)
+    document = report(tmp_path)
+    curves = {curve["name"]: curve["points"] for curve in document["curves"]}
+    assert list(curves) == ["mvcodec", "mvcodec-base", "mvcodec-enhanced", "simulcast", "simulcast-b"]
+    assert list(document["bd_rate"]) == ["simulcast", "simulcast-b"]
+    measured = [*curves["mvcodec-base"], *curves["mvcodec-enhanced"]]
+    assert len(measured) == 4
+    assert all(point in measured for point in curves["mvcodec"])
+    assert all(point["bits_split"]["enhancement"] == 0 for point in curves["mvcodec-base"])
+    for base, both in zip(curves["mvcodec-base"], curves["mvcodec-enhanced"], strict=True):
+        assert both["bits_split"]["texture"] == base["bits_split"]["texture"]
+        assert both["bits_split"]["enhancement"] > 0
 
 
 def test_pictures_that_occur_twice_are_told(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from skimage.metrics import structural_similarity
 from small_arrays import photograph
 
 from mvcodec.errors import SettingError
-from mvcodec.evaluation.metrics import bad_pixel_rate, luma, psnr, psnr_saturated, ssim
+from mvcodec.evaluation.metrics import bad_pixel_rate, luma, psnr, psnr_saturated, psnr_yuv, ssim
 
 
 def reference_ssim(picture: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
@@ -123,3 +123,15 @@ def test_what_cannot_be_compared_is_refused() -> None:
     unknown = np.zeros((2, 2), np.bool_)
     with pytest.raises(SettingError, match="no pixel"):
         bad_pixel_rate(np.zeros((2, 2), np.float32), unknown, np.zeros((2, 2), np.float32))
+
+
+def test_chroma_counts_a_quarter_of_luma_and_chroma_and_luma_the_rest() -> None:
+    grey = np.full((32, 48, 3), 128, np.uint8)
+    bluer = grey.copy()
+    bluer[..., 2] += 20
+    assert psnr_yuv(grey, grey) == 100.0
+    # Cb moves by 20 / 2 of 255, coded as 9 of 224, and Cr by 20 * 0.0722 / 1.5748, coded as 1.
+    cb, cr = 255 * 9 / 224, 255 * 1 / 224
+    chroma = sum(20 * np.log10(255 / error) for error in (cb, cr))
+    assert psnr_yuv(grey, bluer) == pytest.approx((6 * psnr(grey, bluer) + chroma) / 8, abs=0.3)
+    assert psnr_yuv(grey, bluer) < psnr(grey, bluer)

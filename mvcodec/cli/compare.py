@@ -26,6 +26,7 @@ from mvcodec.synthesis.synthesizers import DEFAULT_SYNTHESIZER, make_synthesizer
 SUFFIX = ".mcap"
 COLUMNS = {
     "psnr_y": ("Y-PSNR dB", 9, 2),
+    "psnr_yuv": ("YUV dB", 7, 2),
     "ssim": ("SSIM", 7, 4),
     "temporal_psnr_y": ("temporal dB", 11, 2),
     "iv_psnr": ("IV-PSNR dB", 10, 2),

@@ -90,8 +90,9 @@ def measure_on_cluster(
     store, study = study_run.store, study_run.study
     wanted: dict[str, tuple[str, Mapping[str, Any], int]] = {}
     futures = []
+    measured = study_run.measured_curves
     for number, curve in enumerate(study.curves):
-        for qp in curve.qps:
+        for qp in curve.qps if curve in measured else ():
             depends_on = study_run.depends_on(curve, qp)
             name, pictures = store.name(depends_on), study_run.pictures_of(curve)
             if store.find(name) is not None:

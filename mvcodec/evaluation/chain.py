@@ -61,7 +61,7 @@ def measure_chain(
         bits=bits.total,
         kbps=bits.total * source.array.fps / len(chosen) / 1000,
         quality=_measure(source, chosen, file, synthesizer, decoding, on_picture),
-        split=BitsSplit(bits.texture, bits.disparity, bits.other),
+        split=BitsSplit(bits.texture, bits.disparity, bits.other, bits.enhancement),
         encode_seconds=encoding.seconds + matcher.spared_seconds,
         decode_seconds=decoding.seconds,
         match_seconds=matcher.seconds,

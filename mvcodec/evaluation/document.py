@@ -28,7 +28,7 @@ KINDS = ("all", "virtual")
 def make_document(run: StudyRun, points: Mapping[str, Sequence[CurvePoint]]) -> dict[str, Any]:
     """The whole of report.json, as plain JSON values."""
     source, array, curves = run.source, run.source.array, run.study.curves
-    ours, anchors = curves[0], curves[1:]
+    ours, anchors = curves[0], [curve for curve in curves if curve.anchor is not None]
     deltas = {curve.name: _delta(points[curve.name], points[ours.name]) for curve in anchors}
     warnings = _repetitions(run)
     for curve in curves:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mvcodec.errors import SettingError
 from mvcodec.frames import FloatMap, Mask, Picture
+from mvcodec.video.colour import to_planes
 
 IDENTICAL_PSNR_DB = 100.0
 PEAK = 255.0
@@ -16,6 +17,9 @@ SSIM_WINDOW = 11
 SSIM_SIGMA = 1.5
 SSIM_C1 = (0.01 * PEAK) ** 2
 SSIM_C2 = (0.03 * PEAK) ** 2
+
+CHROMA_SCALE = 255 / 224
+"""Limited range to full range."""
 
 Luma = NDArray[np.uint8]
 """uint8 (H, W), full range."""
@@ -45,6 +49,25 @@ def psnr(original: Picture, picture: Picture) -> float:
     # The sum of squares is an integer: exact in int64 whatever the order of the additions.
     difference = first.astype(np.int32) - second
     return decibel(float(np.square(difference).sum(dtype=np.int64)) / difference.size)
+
+
+def psnr_yuv(original: Picture, picture: Picture) -> float:
+    """(6 Y + Cb + Cr) / 8 of the three PSNRs in dB: luma as in `psnr`, chroma as it is coded.
+
+    Chroma is that of BT.709 at half the size each way, scaled to the full range of 8 bits.
+
+    Args:
+        original, picture: uint8 (H, W, 3) RGB.
+
+    Raises:
+        SettingError: the pictures differ in size.
+    """
+    total = 6 * psnr(original, picture)
+    first, second = to_planes(original), to_planes(picture)
+    for one, other in ((first.u, second.u), (first.v, second.v)):
+        squares = np.square(one.astype(np.int32) - other).sum(dtype=np.int64)
+        total += decibel(float(squares) / one.size * CHROMA_SCALE**2)
+    return total / 8
 
 
 def psnr_saturated(original: Picture, picture: Picture) -> float:

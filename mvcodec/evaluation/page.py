@@ -152,7 +152,7 @@ def _figure(shown: Shown) -> str:
 def _points(document: Mapping[str, Any]) -> str:
     head = ["Curve", "QP", "kbit/s", "kbit a<br>frame set", "maps", "map<br>QP"]
     head += [f"Y-PSNR dB<br>{kind}" for kind in ("all", "real", "virtual", "worst")]
-    head += [f"SSIM<br>{kind}" for kind in ("all", "virtual")]
+    head += ["YUV-PSNR dB<br>all", *(f"SSIM<br>{kind}" for kind in ("all", "virtual"))]
     head += ["encode s", "of it<br>matching", "decode s"]
     rows = []
     for curve in document["curves"]:
@@ -163,6 +163,7 @@ def _points(document: Mapping[str, Any]) -> str:
             cells += [f"{point['bits'] / document['frames'] / 1000:.1f}", f"{maps:.0%}" if own else ""]
             cells += [str(point.get("settings", {}).get("disparity_qp", ""))]
             cells += [_number(point["psnr_y"][kind], ".2f") for kind in ("all", "real", "virtual", "worst")]
+            cells += [_number(point["psnr_yuv"]["all"], ".2f")]
             cells += [_number(point["ssim"][kind], ".4f") for kind in ("all", "virtual")]
             cells += [
                 f"{point['encode_seconds']:.1f}",
@@ -175,7 +176,8 @@ def _points(document: Mapping[str, Any]) -> str:
 
 METHOD = (
     "The same frames, preset and keyframe times for all curves; colour is converted exactly, and luma"
-    " PSNR and SSIM are taken of the decoded pictures in RGB. Each codec's QP is on its own scale;"
+    " PSNR and SSIM are taken of the decoded pictures in RGB. YUV-PSNR is (6 Y + Cb + Cr) / 8."
+    " Each codec's QP is on its own scale;"
     " AV1's are chosen to give about the PSNR of the others.",
     "Anchors: every view of the array, by a stock encoder with constant QP and without a zero-latency"
     " tune. Psycho-visual decisions are off in them as they are in mvcodec's streams, because that"

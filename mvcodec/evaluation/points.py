@@ -22,11 +22,13 @@ class BitsSplit:
         texture: access units of pictures.
         disparity: access units of maps.
         rest: container, headers, calibration.
+        enhancement: units of the enhancement layer.
     """
 
     texture: int
     disparity: int
     rest: int
+    enhancement: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +69,7 @@ class CurvePoint:
             "bits": self.bits,
             "kbps": self.kbps,
             "psnr_y": self.quality.psnr_y.to_json(),
+            "psnr_yuv": self.quality.psnr_yuv.to_json(),
             "ssim": self.quality.ssim.to_json(),
             "bits_split": asdict(self.split),
             "encode_seconds": self.encode_seconds,

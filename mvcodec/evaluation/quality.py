@@ -9,12 +9,12 @@ from threading import Lock
 from typing import Any
 
 from mvcodec.array import Position
-from mvcodec.evaluation.metrics import psnr, ssim
+from mvcodec.evaluation.metrics import psnr, psnr_yuv, ssim
 from mvcodec.evaluation.quality_by_provenance import ProvenanceQuality
 from mvcodec.frames import Picture
 
-METRICS = ("psnr_y", "ssim", "temporal_psnr_y", "iv_psnr")
-"""Figures of views, by the names of `ViewQuality`; the first two are always there."""
+METRICS = ("psnr_y", "psnr_yuv", "ssim", "temporal_psnr_y", "iv_psnr")
+"""Figures of views, by the names of `ViewQuality`; the first three are always there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +25,7 @@ class ViewQuality:
         position: the view.
         real: it was coded, not synthesised.
         psnr_y: mean of the per-picture luma PSNR, dB.
+        psnr_yuv: mean of the per-picture PSNR of luma and chroma, 6:1:1, dB.
         ssim: mean of the per-picture luma SSIM.
         pictures: how many were measured.
         temporal_psnr_y: of the view's sequence, dB, see `FlickerMeter`; None where that was not measured.
@@ -34,6 +35,7 @@ class ViewQuality:
     position: Position
     real: bool
     psnr_y: float
+    psnr_yuv: float
     ssim: float
     pictures: int
     temporal_psnr_y: float | None = None
@@ -76,6 +78,11 @@ class Comparison:
     def psnr_y(self) -> Summary:
         """Luma PSNR, dB."""
         return self.summary("psnr_y")
+
+    @property
+    def psnr_yuv(self) -> Summary:
+        """PSNR of luma and chroma, 6:1:1, dB."""
+        return self.summary("psnr_yuv")
 
     @property
     def ssim(self) -> Summary:
@@ -123,7 +130,7 @@ class QualityMeter:
 
     def __init__(self, real: Collection[Position]) -> None:
         self._real = frozenset(real)
-        self._figures: dict[Position, list[tuple[float, float]]] = {}
+        self._figures: dict[Position, list[tuple[float, float, float]]] = {}
         self._lock = Lock()
 
     def push(self, position: Position, original: Picture, picture: Picture) -> None:
@@ -135,7 +142,7 @@ class QualityMeter:
         Raises:
             SettingError: the pictures differ in size, or are smaller than SSIM's window.
         """
-        figures = psnr(original, picture), ssim(original, picture)
+        figures = psnr(original, picture), psnr_yuv(original, picture), ssim(original, picture)
         with self._lock:
             self._figures.setdefault(position, []).append(figures)
 
@@ -146,13 +153,13 @@ class QualityMeter:
 
 
 def _comparison(
-    figures: Mapping[Position, list[tuple[float, float]]], real: Collection[Position]
+    figures: Mapping[Position, list[tuple[float, float, float]]], real: Collection[Position]
 ) -> Comparison:
     views = []
     for position, pictures in sorted(figures.items()):
         # Threads push in any order; a sorted sum makes the means the same in every run.
-        psnrs, ssims = sorted(p for p, _ in pictures), sorted(s for _, s in pictures)
-        views.append(ViewQuality(position, position in real, fmean(psnrs), fmean(ssims), len(pictures)))
+        psnr_y, yuv, similarity = (fmean(sorted(values)) for values in zip(*pictures, strict=True))
+        views.append(ViewQuality(position, position in real, psnr_y, yuv, similarity, len(pictures)))
     return Comparison(tuple(views))
 
 

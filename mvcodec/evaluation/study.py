@@ -12,6 +12,7 @@ from mvcodec.capture import ArraySource
 from mvcodec.encoding.encoder import EncoderConfig, default_gop, find_matcher
 from mvcodec.errors import OutputError, SettingError
 from mvcodec.evaluation.anchors import ANCHORS, SIMULCAST, Anchor, code_array, sequence_settings
+from mvcodec.evaluation.bd import RatePoint, hull
 from mvcodec.evaluation.chain import measure_chain
 from mvcodec.evaluation.fingerprint import (
     CHAIN,
@@ -30,7 +31,8 @@ from mvcodec.video.codecs import ANCHOR_CODECS, CODECS, find_codec
 from mvcodec.video.pyav import library_versions
 from mvcodec.workers import Job, settle, submit, threads
 
-OURS = "mvcodec"
+OURS, BASE, ENHANCED = "mvcodec", "mvcodec-base", "mvcodec-enhanced"
+"""With an enhancement layer, the first is the hull of the other two: the base alone, and with its layer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +80,8 @@ class Study:
             for anchor in (anchor for family in self.anchors for anchor in ANCHORS[family]):
                 name = anchor.name if codec == own else f"{anchor.name}-{codec}"
                 found.setdefault((anchor.name, codec), Curve(name, codec, qps, anchor))
-        return Curve(OURS, own, self.qps, None), *found.values()
+        names = (OURS,) if self.config.enhance is None else (OURS, BASE, ENHANCED)
+        return *(Curve(name, own, self.qps, None) for name in names), *found.values()
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +104,10 @@ class Curve:
     @property
     def label(self) -> str:
         """For legends and tables."""
-        what = OURS if self.anchor is None else self.anchor.title
+        if self.anchor is None:
+            what = {OURS: OURS, BASE: f"{OURS}, base alone", ENHANCED: f"{OURS}, base and layer"}[self.name]
+        else:
+            what = self.anchor.title
         return f"{what}, {CODECS[self.codec].title}"
 
 
@@ -148,7 +154,26 @@ class StudyRun:
     @property
     def picture_count(self) -> int:
         """What `on_pictures` counts to."""
-        return sum(len(curve.qps) * self.pictures_of(curve) for curve in self.study.curves)
+        return sum(len(curve.qps) * self.pictures_of(curve) for curve in self.measured_curves)
+
+    @property
+    def measured_curves(self) -> tuple[Curve, ...]:
+        """The curves whose points are measured: all but the hull of others."""
+        return tuple(curve for curve in self.study.curves if not self._is_hull(curve))
+
+    def _is_hull(self, curve: Curve) -> bool:
+        return curve.name == OURS and self.study.config.enhance is not None
+
+    def with_hull(self, points: dict[str, list[CurvePoint]]) -> dict[str, list[CurvePoint]]:
+        """The measured points, and where there is an enhancement layer the hull of mvcodec's own."""
+        if self.study.config.enhance is None:
+            return points
+        found = {_place(point): point for name in (BASE, ENHANCED) for point in points[name]}
+        return {OURS: [found[place] for place in hull(list(found))], **points}
+
+    def _config(self, curve: Curve, qp: int) -> EncoderConfig:
+        config = replace(self.study.config, qp=qp)
+        return replace(config, enhance=None, enhance_views=None) if curve.name == BASE else config
 
     def measure(self) -> dict[str, list[CurvePoint]]:
         """The points of every curve by its name.
@@ -162,7 +187,7 @@ class StudyRun:
         waiting: dict[str, list[Job[CurvePoint]]] = {}
         with self._maps:
             try:
-                for curve in self.study.curves:
+                for curve in self.measured_curves:
                     if curve.anchor is None:
                         points[curve.name] = [self.point(curve, qp) for qp in curve.qps]
                 with threads(self.study.jobs):
@@ -178,12 +203,12 @@ class StudyRun:
                     job.cancel()
                 settle(left)
                 raise
-        return points
+        return self.with_hull(points)
 
     def options(self, curve: Curve, qp: int) -> Mapping[str, Any]:
         """What a point is coded with, as plain JSON values."""
         if curve.anchor is None:
-            settings = {**asdict(replace(self.study.config, qp=qp)), "gop": self.gop}
+            settings = {**asdict(self._config(curve, qp)), "gop": self.gop}
             settings |= settings.pop("rate")
             del settings["threads"]  # which changes no bit
             return {**settings, **self._plugins()}
@@ -221,10 +246,10 @@ class StudyRun:
             "code": anchors_code() if curve.anchor else self._chain_code,
             "libraries": library_versions() if curve.anchor else chain_libraries(),
         }
-        return found if curve.anchor else {**found, "maps": self._map_settings(qp)}
+        return found if curve.anchor else {**found, "maps": self._map_settings(self._config(curve, qp))}
 
-    def _map_settings(self, qp: int) -> dict[str, Any]:
-        config, array = replace(self.study.config, qp=qp), self.source.array
+    def _map_settings(self, config: EncoderConfig) -> dict[str, Any]:
+        array = self.source.array
         span = config.disparity_range_px
         return {
             "scale": config.scale_for(array),
@@ -250,12 +275,12 @@ class StudyRun:
         if point is not None:
             self._on_pictures(self.pictures_of(curve))
             return point
-        point = self._anchor_point(curve, qp) if curve.anchor else self._own_point(name, qp)
+        point = self._anchor_point(curve, qp) if curve.anchor else self._own_point(curve, name, qp)
         point = replace(point, versions=measuring_versions())
         self.store.keep(name, point, depends_on)
         return point
 
-    def _own_point(self, name: str, qp: int) -> CurvePoint:
+    def _own_point(self, curve: Curve, name: str, qp: int) -> CurvePoint:
         try:
             self.store.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -263,7 +288,7 @@ class StudyRun:
         return measure_chain(
             self.source,
             self.chosen,
-            replace(self.study.config, qp=qp),
+            self._config(curve, qp),
             Remembered(find_matcher(self.study.config.chosen_matcher), self._maps),
             make_synthesizer(self.study.synthesizer),
             self.store.folder / f"{name}.mcap",
@@ -302,3 +327,9 @@ class StudyRun:
     def _weight(curve: Curve) -> int:
         """How often each picture is counted: an anchor codes and measures it."""
         return 1 if curve.anchor is None else 2
+
+
+def _place(point: CurvePoint) -> RatePoint:
+    decibel = point.quality.psnr_y.all
+    assert decibel is not None
+    return point.kbps, decibel
