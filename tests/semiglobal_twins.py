@@ -84,7 +84,7 @@ def joint_costs(
         elif len(steps) == 1:
             volume[y, x, level] = found[0]
         else:
-            pair = [(found[0] + found[1]) // 2] if len(found) > 1 else []
+            pair = [(found[0] + found[1] + 1) // 2] if len(found) > 1 else []
             volume[y, x, level] = min([found[0] + lone_cost, *pair])
     return volume
 
@@ -159,8 +159,9 @@ def partner_winners(sums: NDArray[np.uint16], low: int, step: tuple[float, float
         for level in range(levels):
             for x in range(width):
                 u, v = x - round(step[0] * (low + level)), y - round(step[1] * (low + level))
-                if 0 <= u < width and 0 <= v < height and sums[y, x, level] < least[v, u]:
-                    least[v, u], disparity[v, u] = sums[y, x, level], low + level
+                found = sums[y, x, level], low + level
+                if 0 <= u < width and 0 <= v < height and found < (least[v, u], disparity[v, u]):
+                    least[v, u], disparity[v, u] = found
     return disparity
 
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import njit
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 
@@ -44,24 +41,6 @@ def hamming(first: np.uint64, second: np.uint64) -> np.int64:
     bits = (bits & np.uint64(0x3333333333333333)) + ((bits >> np.uint64(2)) & np.uint64(0x3333333333333333))
     bits = (bits + (bits >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
     return np.int64((bits * np.uint64(0x0101010101010101)) >> np.uint64(56))
-
-
-@intrinsic
-def _count_bits(context: Any, value: Any) -> Any:
-    """One instruction, of vectors too where the processor has it."""
-    del context
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        del context, signature
-        return builder.ctpop(arguments[0])
-
-    return value(value), generate
-
-
-@njit(cache=True, nogil=True, inline="always")
-def count_bits(value: np.uint8) -> np.uint8:
-    """How many bits of an unsigned integer are set."""
-    return _count_bits(value)  # type: ignore[call-arg]
 
 
 @njit(cache=True, nogil=True)

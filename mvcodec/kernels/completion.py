@@ -111,7 +111,7 @@ def completion_costs(
         low: disparity of level 0, px.
         slope: above 0.
         most: no cost is higher.
-        volume: uint8 (R, levels, W), written: of a band of rows; start: its first row.
+        volume: uint8 (R, levels, W'), W' >= W, written: of a band of rows; start: its first row.
     """
     (height, width), levels = disparity.shape, volume.shape[1]
     per_part = np.uint16(max(slope * (1 << SLOPE_BITS) / PARTS + 0.5, 1))
@@ -120,7 +120,7 @@ def completion_costs(
     for at in range(len(volume)):
         y = start + at
         for level in range(levels):
-            costs = volume[at, level]
+            costs = volume[at, level, :width]
             here = np.int16((low + level) * PARTS)
             _held(disparity[y], here, per_part, farthest, np.uint16(min(limit, most)), costs)
             seen[:] = 0

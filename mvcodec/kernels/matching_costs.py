@@ -1,6 +1,6 @@
 """What it costs that a pixel of one camera shows the same as pixels of its partners.
 
-Rows of pixels are the innermost loops, in 8 bits and free of branches.
+Pixels are compared 64 at a time, in 8 bits and without branches.
 """
 
 from __future__ import annotations
@@ -9,7 +9,23 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvcodec.kernels.census import count_bits
+from mvcodec.kernels.byte_vectors import (
+    LANES,
+    bits,
+    choose,
+    differing,
+    fill,
+    halved,
+    least,
+    load,
+    mean,
+    minus_down_to_0,
+    most,
+    plus,
+    plus_up_to_255,
+    store,
+    times,
+)
 
 Bytes = NDArray[np.uint8]
 Volume = NDArray[np.uint8]
@@ -47,41 +63,26 @@ def sampling_interval(planes: Bytes, along_rows: bool, bounds: Bytes) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _add_colour(planes, here, bounds, least, most, count, difference):  # type: ignore[no-untyped-def]
-    """Add how far a channel is outside of its interval; what is beyond 255 is cut off."""
-    for x in range(count):
-        value = planes[here + x]
-        above = np.uint8(max(value, bounds[most + x]) - bounds[most + x])
-        below = np.uint8(max(bounds[least + x], value) - value)
-        room = np.uint8(np.uint8(255) - difference[x])
-        difference[x] = np.uint8(difference[x] + min(max(above, below), room))
+def _difference(planes, here, bounds, there, channels, stride):  # type: ignore[no-untyped-def]
+    """How far 64 pixels are outside of a partner's intervals, summed over channels; 255 at most."""
+    difference = fill(np.uint8(0))
+    for _ in range(channels):
+        value = load(planes, here)
+        above = minus_down_to_0(value, load(bounds, np.uint64(there + channels * stride)))
+        below = minus_down_to_0(load(bounds, there), value)
+        difference = plus_up_to_255(difference, most(above, below))
+        here, there = np.uint64(here + stride), np.uint64(there + stride)
+    return difference
 
 
 @njit(cache=True, nogil=True)
-def _add_bits(census, here, other, there, count, bits):  # type: ignore[no-untyped-def]
-    for x in range(count):
-        bits[x] = np.uint8(bits[x] + count_bits(census[here + x] ^ other[there + x]))
-
-
-@njit(cache=True, nogil=True)
-def _combine(difference, bits, limits, first, count, least, second):  # type: ignore[no-untyped-def]
-    """The two least costs of each pixel, with one partner more."""
-    colour_limit, bit_cost, most_bits = limits
-    for x in range(count):
-        colour = min(np.uint8(difference[x] >> np.uint8(1)), colour_limit)
-        cost = np.uint8(colour + np.uint8(min(bits[x], most_bits) * bit_cost))
-        second[first + x] = min(second[first + x], max(least[first + x], cost))
-        least[first + x] = min(least[first + x], cost)
-
-
-@njit(cache=True, nogil=True)
-def _decide(least, second, several, lone_cost, outside_cost, costs):  # type: ignore[no-untyped-def]
-    """Both partners' mean, or the better alone."""
-    for x in range(least.size):
-        alone = np.uint8(least[x] + lone_cost) if several else least[x]
-        both = np.uint8((np.uint16(least[x]) + np.uint16(second[x])) >> np.uint16(1))
-        cost = alone if second[x] == OUTSIDE else min(alone, both)
-        costs[x] = outside_cost if least[x] == OUTSIDE else cost
+def _distance(census, here, other, there, words, stride):  # type: ignore[no-untyped-def]
+    """How many bits of the census of 64 pixels differ."""
+    distance = fill(np.uint8(0))
+    for _ in range(words):
+        distance = plus(distance, bits(differing(load(census, here), load(other, there))))
+        here, there = np.uint64(here + stride), np.uint64(there + stride)
+    return distance
 
 
 @njit(cache=True, nogil=True)
@@ -92,6 +93,7 @@ def joint_costs(
     census: Bytes,
     across: NDArray[np.bool_],
     bounds: Bytes,
+    width: int,
     steps: NDArray[np.float32],
     low: int,
     colour_limit: int,
@@ -110,55 +112,63 @@ def joint_costs(
 
     Args:
         camera, partners: which of the N cameras they are; int64 (P,).
-        planes: uint8 (N, H, C, W); census: uint8 (N, H, B, W), see `census.census_rows`.
+        planes: uint8 (N, H, C, W''); census: uint8 (N, H, B, W''), see `census.census_rows`. Rows stand
+            between LANES columns on either side that do not count: W'' = LANES + W' + LANES.
         across: bool (P,), whether a partner stands beside the camera, else above or below it.
-        bounds: uint8 (2, N, H, 2, C, W), see `sampling_interval`; first those along rows, then along columns.
+        bounds: uint8 (2, N, H, 2, C, W''), see `sampling_interval`; first those along rows, then those
+            along columns.
+        width: W, of the pictures.
         steps: float32 (P, 2): a pixel of disparity d is at (x - steps[p, 0] * d, y - steps[p, 1] * d)
             of partner p; rounded.
         low: disparity of level 0, px.
         colour_limit: most that colour counts; bit_cost: of each bit of the census, of which `most_bits` count
             at most. colour_limit + bit_cost * most_bits + lone_cost is below OUTSIDE.
         outside_cost: where no partner's picture holds the pixel.
-        volume: uint8 (R, levels, W), written: of a band of rows; start: its first row.
+        volume: uint8 (R, levels, W'), written: of a band of rows; start: its first row; W' is W, rounded up
+            to LANES.
     """
-    _, height, channels, width = planes.shape
-    levels, words = volume.shape[1], census.shape[2]
-    limits = np.uint8(colour_limit), np.uint8(bit_cost), np.uint8(most_bits)
-    least, second = np.empty((2, levels, width), np.uint8)
-    difference, bits = np.empty(width, np.uint8), np.empty(width, np.uint8)
-    # Flat arrays by unsigned indexes: slices would take longer to make than rows take to compare.
-    flat_planes, flat_census = planes[camera].reshape(-1), census[camera].reshape(-1)
+    _, height, channels, padded = planes.shape
+    levels, words, columns = volume.shape[1], np.uint64(census.shape[2]), volume.shape[2]
+    stride, plane_count = np.uint64(padded), np.uint64(channels)
+    zero, nowhere = fill(np.uint8(0)), fill(OUTSIDE)
+    limit, most_distance = fill(np.uint8(colour_limit)), fill(np.uint8(most_bits))
+    each_bit = fill(np.uint8(bit_cost))
+    alone = fill(np.uint8(lone_cost)) if len(steps) > 1 else zero
+    outside = np.full(padded, OUTSIDE, np.uint8)
+    outside[LANES : LANES + width] = 0
+    left, up = np.empty((2, len(steps), levels), np.int64)
+    for p in range(len(steps)):
+        for level in range(levels):
+            left[p, level] = int(np.rint(steps[p, 0] * (low + level)))
+            up[p, level] = int(np.rint(steps[p, 1] * (low + level)))
+    sides = np.array([0 if along else 1 for along in across])
+    flat_planes, flat_census, flat_bounds = planes.reshape(-1), census.reshape(-1), bounds.reshape(-1)
+    flat = volume.reshape(-1)
     for at in range(len(volume)):
         y = start + at
-        least[:], second[:] = OUTSIDE, OUTSIDE
-        # Levels in turn, so that loops are of nearly the same length as the ones before.
-        for p in range(len(steps)):
-            interval = bounds[0 if across[p] else 1, partners[p]].reshape(-1)
-            other = census[partners[p]].reshape(-1)
+        for x in range(0, columns, LANES):
+            plane_here = np.uint64(((camera * height + y) * channels) * padded + LANES + x)
+            census_here = np.uint64((camera * height + y) * census.shape[2] * padded + LANES + x)
             for level in range(levels):
-                left = int(np.rint(steps[p, 0] * (low + level)))
-                row = y - int(np.rint(steps[p, 1] * (low + level)))
-                first, last = max(left, 0), min(width + left, width)
-                if row < 0 or row >= height or last <= first:
-                    continue
-                count, begin = np.uint64(last - first), first - left
-                difference[:], bits[:] = 0, 0
-                for c in range(channels):
-                    here = np.uint64((y * channels + c) * width + first)
-                    least_there = np.uint64((row * 2 * channels + c) * width + begin)
-                    most_there = np.uint64((row * 2 * channels + channels + c) * width + begin)
-                    _add_colour(flat_planes, here, interval, least_there, most_there, count, difference)
-                for w in range(words):
-                    here = np.uint64((y * words + w) * width + first)
-                    there = np.uint64((row * words + w) * width + begin)
-                    _add_bits(flat_census, here, other, there, count, bits)
-                _combine(difference, bits, limits, np.uint64(first), count, least[level], second[level])
-        for level in range(levels):
-            _decide(
-                least[level],
-                second[level],
-                len(steps) > 1,
-                np.uint8(lone_cost),
-                np.uint8(outside_cost),
-                volume[at, level],
-            )
+                best, second = nowhere, nowhere
+                for p in range(len(steps)):
+                    row, column = y - up[p, level], x - left[p, level]
+                    if row < 0 or row >= height or column <= -LANES or column >= width:
+                        continue
+                    begin = LANES + column
+                    there = (sides[p] * len(planes) + partners[p]) * height + row
+                    plane_there = np.uint64(there * 2 * channels * padded + begin)
+                    difference = _difference(
+                        flat_planes, plane_here, flat_bounds, plane_there, plane_count, stride
+                    )
+                    census_there = np.uint64((partners[p] * height + row) * census.shape[2] * padded + begin)
+                    distance = _distance(flat_census, census_here, flat_census, census_there, words, stride)
+                    distance = times(least(distance, most_distance), each_bit)
+                    cost = plus(least(halved(difference), limit), distance)
+                    cost = most(cost, load(outside, np.uint64(begin)))
+                    second = least(second, most(best, cost))
+                    best = least(best, cost)
+                lone = plus(best, alone)
+                cost = choose(second, nowhere, lone, least(lone, mean(best, second)))
+                cost = choose(best, nowhere, fill(np.uint8(outside_cost)), cost)
+                store(flat, np.uint64((at * levels + level) * columns + x), cost)

@@ -159,6 +159,7 @@ class Joint:
                 views.census,
                 those.across,
                 views.bounds,
+                array.width,
                 those.steps,
                 low,
                 settings.colour_limit,

@@ -19,12 +19,14 @@ from mvcodec.workers import run_all
 class MatchingViews:
     """What matching needs of the pictures of N cameras. Rows of all planes stand side by side in memory.
 
+    All but `grey` have columns beyond both ends of a row: W'' of them, see `matching_costs.joint_costs`.
+
     Attributes:
         cameras: in the order of the arrays.
-        planes: uint8 (N, H, 3, W), RGB at equal brightness.
+        planes: uint8 (N, H, 3, W''), RGB at equal brightness.
         grey: uint8 (N, H, W), the same in luma.
-        census: uint8 (N, H, B, W), see `mvcodec.kernels.census.census_rows`.
-        bounds: uint8 (2, N, H, 2, 3, W), least and greatest value within half a pixel along rows and along
+        census: uint8 (N, H, B, W''), see `mvcodec.kernels.census.census_rows`.
+        bounds: uint8 (2, N, H, 2, 3, W''), least and greatest value within half a pixel along rows and along
             columns (`matching_costs.sampling_interval`), of the cameras that are partners so.
     """
 
@@ -54,16 +56,18 @@ def prepare_views(
         census_radii: of the census's window, px along rows and along columns.
     """
     from mvcodec.kernels import census, matching_costs
+    from mvcodec.kernels.byte_vectors import LANES
 
     count, height, width = len(array.real), array.height, array.width
     radius_x, radius_y = census_radii
     words = -(-((2 * radius_x + 1) * (2 * radius_y + 1) - 1) // 8)
+    padded, inside = LANES * (2 - -width // LANES), slice(LANES, LANES + width)
     found = MatchingViews(
         array.real,
-        np.empty((count, height, 3, width), np.uint8),
+        np.empty((count, height, 3, padded), np.uint8),
         np.empty((count, height, width), np.uint8),
-        np.empty((count, height, words, width), np.uint8),
-        np.empty((2, count, height, 2, 3, width), np.uint8),
+        np.empty((count, height, words, padded), np.uint8),
+        np.empty((2, count, height, 2, 3, padded), np.uint8),
     )
     beside = {(camera[0] == other[0], other) for camera in cameras for other in partners(array, camera)}
 
@@ -72,12 +76,17 @@ def prepare_views(
         picture = pictures[camera]
         if np.any(gains[camera] != 1):
             picture = np.asarray(np.rint(picture * gains[camera]).clip(0, 255), np.uint8)
-        found.planes[number] = picture.transpose(0, 2, 1)
+        planes = np.ascontiguousarray(picture.transpose(0, 2, 1))
+        found.planes[number][..., inside] = planes
         cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY, found.grey[number])
-        census.census_rows(found.grey[number], radius_x, radius_y, found.census[number])
+        bits = np.empty((height, words, width), np.uint8)
+        census.census_rows(found.grey[number], radius_x, radius_y, bits)
+        found.census[number][..., inside] = bits
+        bounds = np.empty((height, 2, 3, width), np.uint8)
         for side, along_rows in enumerate((True, False)):
             if (along_rows, camera) in beside:
-                matching_costs.sampling_interval(found.planes[number], along_rows, found.bounds[side, number])
+                matching_costs.sampling_interval(planes, along_rows, bounds)
+                found.bounds[side, number][..., inside] = bounds
 
     run_all(prepare, range(count))
     return found

@@ -16,12 +16,10 @@ from numpy.typing import NDArray
 from mvcodec.errors import SettingError
 from mvcodec.frames import FloatMap
 
-BAND_ROWS, LOOK_AHEAD = 128, 64
+BAND_ROWS, LOOK_AHEAD = 64, 32
 """Rows that are decided at once, and how many below them have a say: what fits into the caches. On pictures
 of at most BAND_ROWS + LOOK_AHEAD rows, and wherever no path is longer, bands change nothing."""
-TURNED_ROWS = 64
-"""Rows that are turned at once, for the paths along them."""
-
+CACHE_LINE = 64
 
 MAX_SUM = 255
 """Most that a cost, a jump and a small step may add up to, since paths count in 8 bits."""
@@ -74,12 +72,13 @@ class Scratch:
         self._kept: dict[str, NDArray[Any]] = {}
 
     def array(self, name: str, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArray[Any]:
-        """Contiguous memory of that name, its content left as it is."""
-        size = math.prod(shape)
+        """Contiguous memory of that name, its content left as it is; it begins where a cache line does."""
+        size = math.prod(shape) * np.dtype(dtype).itemsize
         kept = self._kept.get(name)
-        if kept is None or kept.size < size or kept.dtype != dtype:
-            kept = self._kept[name] = np.empty(size, dtype)
-        return kept[:size].reshape(shape)
+        if kept is None or kept.size < size:
+            raw = np.empty(size + CACHE_LINE, np.uint8)
+            kept = self._kept[name] = raw[-raw.ctypes.data % CACHE_LINE :][:size]
+        return kept[:size].view(dtype).reshape(shape)
 
 
 class ScratchPool:
@@ -102,7 +101,7 @@ class ScratchPool:
 
 
 CostsOf = Callable[[int, NDArray[np.uint8]], None]
-"""Writes the costs of rows from the given one on into uint8 (rows, levels, W)."""
+"""Writes the costs of rows from the given one on into uint8 (rows, levels, W'), W' >= W of the picture."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,17 +132,21 @@ def decide(
     Paths from above come through all bands. Those from below begin LOOK_AHEAD rows below a band.
 
     Args:
-        costs_of: gives the costs; see `semiglobal.add_paths`.
+        costs_of: gives the costs; see `semiglobal.sum_downwards`.
         grey: uint8 (H, W), of the camera.
         low, levels: disparity of level 0, px, and how many levels there are.
         partner_steps: float32 (P, 2), see `semiglobal.take_partner_winners`; None: nothing about partners.
     """
     from mvcodec.kernels import semiglobal
+    from mvcodec.kernels.byte_vectors import LANES
 
     height, width = grey.shape
-    jumps, small, paths = penalties.jumps(), penalties.small_step, 3 if penalties.diagonals else 1
-    above = semiglobal.path_state(levels, width, paths, small)
-    costs = scratch.array("costs", (BAND_ROWS + LOOK_AHEAD, levels, width), np.uint8)
+    padded = -(-width // LANES) * LANES
+    table, small = penalties.jumps(), penalties.small_step
+    ways = (-1, 0, 1) if penalties.diagonals else (0,)
+    paths, jumps = len(ways), np.stack([_jumps_down(grey, table, way) for way in ways])
+    above = _beginning(paths, levels, padded, scratch, "above")
+    costs = scratch.array("costs", (BAND_ROWS + LOOK_AHEAD, levels, padded), np.uint8)
     disparity = np.empty((height, width), np.float32)
     steps = np.empty((0, 2), np.float32) if partner_steps is None else partner_steps
     seen = np.full((len(steps), 2, height, width), 65535, np.uint16)
@@ -157,42 +160,73 @@ def decide(
         known = reach
         band = costs[: stop - start]
         sums = scratch.array("sums", band.shape, np.uint16)
-        _set_along_rows(band, grey[start:stop], jumps, small, sums, scratch)
-        semiglobal.add_paths(band, grey, start, jumps, small, True, start > 0, *above, sums)
-        below = semiglobal.path_state(levels, width, paths, small)
-        with_below = costs[: reach - start]
-        semiglobal.add_paths(with_below, grey, start, jumps, small, False, False, *below, sums)
-        semiglobal.winners(sums, low, disparity[start:stop])
-        for (by_x, by_y), (least, best) in zip(steps, seen, strict=True):
-            semiglobal.take_partner_winners(sums, start, low, by_x, by_y, least, best)
+        along = _along_rows(band, grey[start:stop], table, small, scratch)
+        semiglobal.sum_downwards(band, jumps[:, start:stop], small, *above, along, sums)
+        # Nothing comes in from below the rows that are looked at.
+        ways_up = jumps[:, start : reach + 1].copy()
+        ways_up[:, -1] = 0
+        below = _beginning(paths, levels, padded, scratch, "below")
+        with_below, found = costs[: reach - start], disparity[start:stop]
+        semiglobal.decide_upwards(with_below, ways_up, small, *below, sums, start, low, found, steps, seen)
     best = seen[:, 1]
     return Decided(disparity, np.where(best == 65535, np.float32(np.inf), best.astype(np.float32) + low))
 
 
-def _set_along_rows(
+def _beginning(
+    paths: int, levels: int, width: int, scratch: Scratch, name: str
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Paths before their first row, see `semiglobal.sum_downwards`."""
+    from mvcodec.kernels.byte_vectors import LANES
+    from mvcodec.kernels.semiglobal import path_size
+
+    rows = scratch.array(name, (2, paths, path_size(levels, width)), np.uint8)
+    rows.fill(MAX_SUM)
+    return rows, np.zeros((2, paths, LANES + width + LANES), np.uint8)
+
+
+def _jumps_down(grey: NDArray[np.uint8], table: NDArray[np.uint8], way: int) -> NDArray[np.uint8]:
+    """What a jump costs on the way to each pixel from the row above, `way` columns beside it.
+
+    Returns:
+        uint8 (H + 1, LANES + W' + LANES); 0 where it comes from outside of the picture.
+    """
+    from mvcodec.kernels.byte_vectors import LANES
+
+    height, width = grey.shape
+    first, last = max(-way, 0), min(width - way, width)
+    jumps = np.zeros((height + 1, LANES * (2 - -width // LANES)), np.uint8)
+    if height > 1 and first < last:
+        changes = cv2.absdiff(grey[1:, first:last], grey[:-1, first + way : last + way])
+        jumps[1:height, LANES + first : LANES + last] = cv2.LUT(changes, table)
+    return jumps
+
+
+def _along_rows(
     costs: NDArray[np.uint8],
     grey: NDArray[np.uint8],
     jumps: NDArray[np.uint8],
     small: int,
-    sums: NDArray[np.uint16],
     scratch: Scratch,
-) -> None:
-    """Both paths along rows: paths from row to row of turned bands."""
+) -> NDArray[np.uint8]:
+    """Both paths along rows, uint8 (2, R, levels, W'): those of turned bands of LANES rows."""
     from mvcodec.kernels import semiglobal
+    from mvcodec.kernels.byte_vectors import LANES
 
-    height, levels, width = costs.shape
-    flat = levels * width
-    for start in range(0, height, TURNED_ROWS):
-        band = slice(start, start + TURNED_ROWS)
-        rows = len(grey[band])
-        turned = scratch.array("turned", (flat, rows), np.uint8)
-        cv2.transpose(costs[band].reshape(rows, flat), turned)
-        turned_grey = np.ascontiguousarray(grey[band].T)
-        path = scratch.array("path", (levels, width, rows), np.uint8)
-        back = scratch.array("back", (2, rows, flat), np.uint8)
-        for forwards, found in zip((True, False), back, strict=True):
-            semiglobal.turned_path(
-                turned.reshape(levels, width, rows), turned_grey, jumps, small, forwards, path
-            )
-            cv2.transpose(path.reshape(flat, rows), found)
-        cv2.add(back[0], back[1], sums[band].reshape(rows, flat), dtype=cv2.CV_16U)
+    height, levels, padded = costs.shape
+    width, flat = grey.shape[1], levels * padded
+    along = scratch.array("along", (2, height, levels, padded), np.uint8)
+    turned = scratch.array("turned", (levels, padded, LANES), np.uint8)
+    path = scratch.array("path", (levels, padded, LANES), np.uint8)
+    state = scratch.array("state", ((levels + 2) * LANES,), np.uint8)
+    turned_jumps = np.zeros((width + 1, LANES), np.uint8)
+    for start in range(0, height, LANES):
+        rows = min(LANES, height - start)
+        band = slice(start, start + rows)
+        cv2.transpose(costs[band].reshape(rows, flat), turned.reshape(flat, LANES)[:, :rows])
+        if width > 1:
+            changes = cv2.absdiff(grey[band, 1:], grey[band, :-1])
+            turned_jumps[1:width, :rows] = cv2.LUT(changes, jumps).T
+        for forwards, found in zip((True, False), along, strict=True):
+            semiglobal.turned_path(turned, turned_jumps, small, forwards, state, path)
+            cv2.transpose(path.reshape(flat, LANES)[:, :rows], found[band].reshape(rows, flat))
+    return along
