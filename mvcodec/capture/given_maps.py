@@ -14,7 +14,7 @@ from mvcodec.capture.file_patterns import pattern_files, pattern_names
 from mvcodec.capture.truth import read_map
 from mvcodec.errors import InputError
 from mvcodec.fields import Fields
-from mvcodec.frames import DisparityMap
+from mvcodec.frames import DisparityMap, FloatMap, Mask
 
 _KINDS = ("disparity", "depth")
 
@@ -48,25 +48,41 @@ class GivenFiles:
         files = self.files[view]
         path = files if isinstance(files, Path) else files[number]
         values = read_map(path)
-        height, width = values.shape
-        fits = abs(width * array.height - height * array.width) <= max(array.width, array.height)
-        if not (fits and width <= array.width and height <= array.height):
-            expected = f"{array.width}x{array.height} px as the pictures, or smaller in proportion"
-            raise InputError(path, f"{width}x{height} px", expected)
-        valid = np.isfinite(values)
-        if self.invalid is not None:
-            valid &= values != np.float32(self.invalid)
+        check_map_size(values, array, path)
+        unknown = None if self.invalid is None else values == np.float32(self.invalid)
         if self.kind == "depth":
-            valid &= values > 0
-        amount = np.where(valid, values, 1) / self.scale
-        if self.kind == "depth":
-            calibration = array.calibration
-            focal_px = calibration.fx_px if array.cols > 1 else calibration.fy_px
-            per_step = focal_px * calibration.baseline_m / amount + calibration.d_inf_px_per_step
-        else:
-            per_step = amount / abs(self.steps)
-        px = np.where(valid, per_step * array.baseline_steps, 0)
+            return disparity_of_depth(values / self.scale, array, unknown)
+        valid = np.isfinite(values) if unknown is None else np.isfinite(values) & ~unknown
+        px = np.where(valid, values, 0) / self.scale / abs(self.steps) * array.baseline_steps
         return DisparityMap(px.astype(np.float32), valid)
+
+
+def check_map_size(values: FloatMap, array: CameraArray, source: str | Path) -> None:
+    """A map must be of its picture's size, or smaller in the same proportion.
+
+    Raises:
+        InputError: it isn't; names `source`.
+    """
+    height, width = values.shape
+    fits = abs(width * array.height - height * array.width) <= max(array.width, array.height)
+    if not (fits and width <= array.width and height <= array.height):
+        expected = f"{array.width}x{array.height} px as the pictures, or smaller in proportion"
+        raise InputError(source, f"{width}x{height} px", expected)
+
+
+def disparity_of_depth(depth_m: FloatMap, array: CameraArray, unknown: Mask | None = None) -> DisparityMap:
+    """Disparity, px of a cell's baseline, of depth in metres: by the calibration, ALGORITHMS 0.
+
+    Args:
+        unknown: where it is besides where depth is not finite or not above 0.
+    """
+    valid = np.isfinite(depth_m) & (depth_m > 0)
+    if unknown is not None:
+        valid &= ~unknown
+    calibration = array.calibration
+    focal_px = calibration.fx_px if array.cols > 1 else calibration.fy_px
+    per_step = focal_px * calibration.baseline_m / np.where(valid, depth_m, 1) + calibration.d_inf_px_per_step
+    return DisparityMap(np.where(valid, per_step * array.baseline_steps, 0).astype(np.float32), valid)
 
 
 class GivenOfFrame(Mapping[Position, DisparityMap]):

@@ -8,11 +8,16 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
 from typing import BinaryIO
 
+import numpy as np
+
 from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.capture.bit_depth import BitDepth
+from mvcodec.capture.given_maps import check_map_size, disparity_of_depth
 from mvcodec.capture.message_clock import MessageClock
 from mvcodec.capture.pairing import NEAREST_SHARE, TOLD_SHARE, typical_step_ns
+from mvcodec.capture.picture_messages import StillDecoder
 from mvcodec.capture.recorded_calibration import NotRectified, array_calibration, recorded_cameras
+from mvcodec.capture.recorded_maps import DepthDecoder, Depths
 from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.capture.selection import select_real
 from mvcodec.capture.timing import rate_of_times
@@ -36,7 +41,8 @@ _FIRST_TOLERANCE_NS = 8_000_000
 _TOLD = 5
 """Dropped frames that are told one by one; the rest are counted."""
 
-_Found = tuple[int, dict[Position, Picture]]
+_Found = tuple[int, dict[Position, Picture | Depths]]
+"""Time, pictures by grid place; depth stands below the grid, as if that had as many rows more."""
 
 
 class Recording:
@@ -75,6 +81,11 @@ class Recording:
         self._topics = {
             settings.topics[row][col]: (row, col) for row in self._axes[0] for col in self._axes[1]
         }
+        for row, names in enumerate(settings.depth_topics or ()):
+            self._topics |= {
+                name: (rows + row, col) for col, name in enumerate(names) if self._is_real(row, col)
+            }
+        self._names = {position: topic for topic, position in self._topics.items()}
         parts = files if isinstance(files, Sequence) else [files]
         self._reader = RecordingReader(parts, name, list(self._topics), settings.clock, limits, on_damage)
         for note in self._reader.notes:
@@ -84,7 +95,12 @@ class Recording:
         offsets = settings.offsets_ns(list(self._topics))
         self._pictures = {
             position: TopicPictures(
-                name, self._clock, offsets.get(topic, 0), self._depth, self._reader.indexed, self._tell
+                name,
+                self._clock,
+                offsets.get(topic, 0),
+                StillDecoder(name, self._depth) if position[0] < rows else DepthDecoder(name),
+                self._reader.indexed,
+                self._tell,
             )
             for topic, position in self._topics.items()
         }
@@ -103,6 +119,10 @@ class Recording:
         self.array = self._make_array(self._first[0])
         self.cameras = recorded_cameras(self._reader.rig or RecordedRig(), self._frames)
         self._reader.rig = None
+        if settings.depth_topics is not None and not self.array.calibration.given:
+            raise InputError(
+                name, "depth without calibration", "`calibration` FILE, which makes it disparity"
+            )
 
     @property
     def dropped(self) -> int:
@@ -111,16 +131,28 @@ class Recording:
 
     def frame_sets(self) -> Iterator[FrameSet]:
         """Frame sets in order, numbered from 0; warnings at the end count what was dropped."""
-        size = (self.array.height, self.array.width, 3)
-        for index, (time_ns, pictures) in enumerate(chain(self._first, self._sets)):
-            for camera, picture in pictures.items():
-                if picture.shape != size:
-                    found = f"a picture of {picture.shape[1]}x{picture.shape[0]} px"
-                    topic = self._settings.topics[camera[0]][camera[1]]
-                    label = f"{self.name}: {topic} at {time_ns / 1e9:.3f} s"
-                    raise InputError(label, found, f"{size[1]}x{size[0]} px as in the first frame set")
-            yield FrameSet(index, time_ns, pictures)
+        array, rows = self.array, self._settings.grid[0]
+        for index, (time_ns, found) in enumerate(chain(self._first, self._sets)):
+            pictures: dict[Position, Picture] = {}
+            given = {}
+            for (row, col), values in found.items():
+                label = f"{self.name}: {self._names[row, col]} at {time_ns / 1e9:.3f} s"
+                if row >= rows:
+                    depths = np.asarray(values, np.float32)
+                    check_map_size(depths, array, label)
+                    given[row - rows, col] = disparity_of_depth(depths, array)
+                    continue
+                if values.shape != (array.height, array.width, 3):
+                    size = f"a picture of {values.shape[1]}x{values.shape[0]} px"
+                    raise InputError(
+                        label, size, f"{array.width}x{array.height} px as in the first frame set"
+                    )
+                pictures[row, col] = np.asarray(values, np.uint8)
+            yield FrameSet(index, time_ns, pictures, given)
         self._tell_end()
+
+    def _is_real(self, row: int, col: int) -> bool:
+        return row in self._axes[0] and col in self._axes[1]
 
     def _warn(self, text: str) -> None:
         warnings.warn(f"{self.name}: {text}", MvCodecWarning, stacklevel=3)
@@ -135,8 +167,7 @@ class Recording:
         step = self._step_ns()
         for position, (low, high) in self._apart.items():
             if step and high - low <= TOLD_SHARE * step < max(-low, high):
-                topic = self._settings.topics[position[0]][position[1]]
-                first = self._settings.topics[0][0]
+                topic, first = self._names[position], next(iter(self._topics))
                 middle = (low + high) / 2
                 self._warn(
                     f"{topic} takes its pictures {abs(middle) / 1e6:.4g} ms"
@@ -197,8 +228,9 @@ class Recording:
         self.calibration_note = "no calibration given"
         try:
             assert self._reader.rig is not None
-            topics = {position: topic for topic, position in self._topics.items()}
-            frames = self._reader.rig.tell_apart(self._frames, topics)
+            frames = self._reader.rig.tell_apart(
+                self._frames, {position: self._names[position] for position in self._frames}
+            )
             found = array_calibration(self._reader.rig, frames, (width, height))
         except NotRectified as reason:
             self.calibration_note = f"its calibration is not that of a rectified array ({reason})"
@@ -212,7 +244,8 @@ class Recording:
         """(time of the first camera, pictures) of every frame set that is whole."""
         for message in self._reader.pictures():
             camera = self._topics[message.topic]
-            self._frames.setdefault(camera, message.frame_id)
+            if camera[0] < self._settings.grid[0]:
+                self._frames.setdefault(camera, message.frame_id)
             try:
                 self._wait(camera, self._pictures[camera].push(message))
             except InputError as error:
@@ -279,7 +312,7 @@ class Recording:
             if (apart := self._clock.check_apart(list(self._topics), self._step_ns())) is not None:
                 self._warn(apart)
 
-    def _decode(self, picture: WaitingPicture) -> Picture | None:
+    def _decode(self, picture: WaitingPicture) -> Picture | Depths | None:
         try:
             return picture.decode()
         except InputError as error:

@@ -27,6 +27,7 @@ class RecordingSettings:
         calibration: of all cameras; None: the recording's own, or nominal.
         offsets_ms: what is added to a topic's times.
         fps, tolerance_ms, clock, bits: explained by their fields.
+        depth_topics: of the depth of every view, rows as `topics` has them; None: there is none.
 
     Raises:
         SettingError: the grid is not one, names a topic twice, or a number is out of range.
@@ -44,12 +45,20 @@ class RecordingSettings:
     )
     offsets_ms: Mapping[str, float] = field(default_factory=dict)
     bits: int | None = used_bits()
+    depth_topics: TopicGrid | None = None
 
     def __post_init__(self) -> None:
         widths = {len(row) for row in self.topics}
         names = list(chain.from_iterable(self.topics))
         if len(widths) != 1 or not names or not all(names):
             raise SettingError("topics", f"rows of {sorted(widths)} topics", "rows of one length")
+        if self.depth_topics is not None:
+            if [len(row) for row in self.depth_topics] != [len(row) for row in self.topics]:
+                found = f"{len(list(chain.from_iterable(self.depth_topics)))} topics"
+                raise SettingError(
+                    "depth_topics", found, f"rows of topics as `topics` has them: {len(names)}"
+                )
+            names += chain.from_iterable(self.depth_topics)
         if len(set(names)) != len(names):
             raise SettingError("topics", "a topic twice", "each topic once")
         check_settings(self)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TypeVar
 
 from mvcodec.array import Position
 from mvcodec.capture.pairing import typical_step_ns
@@ -20,6 +21,8 @@ from mvcodec.capture.sync import (
 from mvcodec.capture.view_array import ViewReader
 from mvcodec.errors import InputError, MvCodecWarning
 from mvcodec.workers import run_all
+
+Camera = TypeVar("Camera", bound=Hashable)
 
 
 def synchronised(
@@ -38,36 +41,52 @@ def synchronised(
     Raises:
         InputError: nothing tells how far a camera's clock is apart.
     """
-    first, *others = views
-    offsets = {first: 0}
     if sync == "motion":
-        motions = run_all(_motion, views.values(), [times_ns[v] for v in views], [names[v] for v in views])
-        signals = dict(zip(views, motions, strict=True))
-        found = {view: motion_offset_ns(signals[first], signals[view]) for view in others}
-    else:
-        sounds = dict(zip(views, run_all(lambda view: sound_of(view.path), views.values()), strict=True))
-        found = {view: sound_offset_ns(sounds[first], sounds[view]) for view in others}
-    for view, (offset_ns, likeness) in found.items():
+        motions = run_all(_motion, views.values(), [times_ns[v] for v in views])
+        return offsets_by_motion(dict(zip(views, motions, strict=True)), times_ns, names)
+    first, *others = views
+    sounds = dict(zip(views, run_all(lambda view: sound_of(view.path), views.values()), strict=True))
+    found = {view: sound_offset_ns(sounds[first], sounds[view]) for view in others}
+    return {first: 0} | _told(found, times_ns, names, names[first], sync)
+
+
+def offsets_by_motion(
+    motions: Mapping[Camera, Motion], times_ns: Mapping[Camera, Sequence[int]], names: Mapping[Camera, str]
+) -> dict[Camera, int]:
+    """What to add to the times of cameras whose motion is known, ns; see `synchronised`."""
+    for camera, motion in motions.items():
+        if len(motion.times_ns) < MIN_STEPS:
+            count = f"{len(motion.times_ns) + 1} pictures"
+            raise InputError(names[camera], count, f"{MIN_STEPS + 1} or more, for sync motion")
+        if motion.is_still:
+            what = "pictures in which nothing moves"
+            raise InputError(names[camera], what, "some motion, or `offsets_ms` CAMERA=MS")
+    first, *others = motions
+    found = {camera: motion_offset_ns(motions[first], motions[camera]) for camera in others}
+    return {first: 0} | _told(found, times_ns, names, names[first], "motion")
+
+
+def _told(
+    found: Mapping[Camera, tuple[float, float]],
+    times_ns: Mapping[Camera, Sequence[int]],
+    names: Mapping[Camera, str],
+    first: str,
+    sync: str,
+) -> dict[Camera, int]:
+    """Offsets in whole ns, which are told; those that nothing tells are an error."""
+    for camera, (offset_ns, likeness) in found.items():
         if likeness < LEAST_LIKENESS:
-            what = f"nothing in common with {names[first]} to tell the time by (correlation {likeness:.2f})"
-            raise InputError(names[view], what, "the same scene that changes, or `offsets_ms` CAMERA=MS")
-        offsets[view] = round(offset_ns)
-        step = typical_step_ns(times_ns[view])
+            what = f"nothing in common with {first} to tell the time by (correlation {likeness:.2f})"
+            raise InputError(names[camera], what, "the same scene that changes, or `offsets_ms` CAMERA=MS")
+        step = typical_step_ns(times_ns[camera])
         if step and abs(offset_ns) > 0.02 * step:
             text = (
-                f"by {sync}, {names[view]} is {-offset_ns / 1e6:.1f} ms ahead of {names[first]}"
+                f"by {sync}, {names[camera]} is {-offset_ns / 1e6:.1f} ms ahead of {first}"
                 f" (correlation {likeness:.2f}): that is taken back"
             )
-            warnings.warn(text, MvCodecWarning, stacklevel=4)
-    return offsets
+            warnings.warn(text, MvCodecWarning, stacklevel=5)
+    return {camera: round(offset_ns) for camera, (offset_ns, _) in found.items()}
 
 
-def _motion(view: ViewReader, times_ns: Sequence[int], name: str) -> Motion:
-    count = min(len(times_ns), MAX_PICTURES)
-    motion = motion_of(view.readable(range(count), lambda _: None), times_ns)
-    if len(motion.times_ns) < MIN_STEPS:
-        found = f"{len(motion.times_ns) + 1} pictures"
-        raise InputError(name, found, f"{MIN_STEPS + 1} or more, for sync motion")
-    if motion.is_still:
-        raise InputError(name, "pictures in which nothing moves", "some motion, or `offsets_ms` CAMERA=MS")
-    return motion
+def _motion(view: ViewReader, times_ns: Sequence[int]) -> Motion:
+    return motion_of(view.readable(range(min(len(times_ns), MAX_PICTURES)), lambda _: None), times_ns)

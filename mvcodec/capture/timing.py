@@ -59,7 +59,7 @@ class Timing:
     tolerance_ms: float | None = tolerance()
     sync: str | None = setting(
         None,
-        "estimate the other offsets of files from what moves in their pictures, or from their sound tracks",
+        "estimate the other offsets from what moves in the pictures, or from the sound tracks of files",
         choices=SYNCS,
     )
 

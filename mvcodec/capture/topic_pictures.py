@@ -9,9 +9,9 @@ from functools import partial
 
 from av.video.reformatter import VideoReformatter
 
-from mvcodec.capture.bit_depth import BitDepth
 from mvcodec.capture.message_clock import SET_BACK_NS, MessageClock
 from mvcodec.capture.picture_messages import StillDecoder
+from mvcodec.capture.recorded_maps import DepthDecoder, Depths
 from mvcodec.capture.stamp_check import Judged, StampCheck
 from mvcodec.capture.video_input import frame_to_rgb
 from mvcodec.capture.video_messages import LeftOut, ShownPicture, VideoDecoder
@@ -33,13 +33,13 @@ class WaitingPicture:
         time_ns: when it was taken.
         message: where it came from.
         size: bytes of memory.
-        decode: uint8 (H, W, 3) RGB of it; raises InputError.
+        decode: uint8 (H, W, 3) RGB of it, or its depth (see `DepthDecoder`); raises InputError.
     """
 
     time_ns: int
     message: RecordedPicture
     size: int
-    decode: Callable[[], Picture]
+    decode: Callable[[], Picture | Depths]
 
 
 class TopicPictures:
@@ -49,7 +49,7 @@ class TopicPictures:
         name: of the recording, for messages.
         clock: of the recording.
         offset_ns: what is added to the topic's times.
-        depth: of the recording.
+        stills: decodes its still pictures, or its depth.
         settled: the recording can be looked ahead in: still pictures are put in order of their stamps.
         leave_out: told of messages whose picture is left out, and why.
     """
@@ -59,13 +59,13 @@ class TopicPictures:
         name: str,
         clock: MessageClock,
         offset_ns: int,
-        depth: BitDepth,
+        stills: StillDecoder | DepthDecoder,
         settled: bool,
         leave_out: Callable[[RecordedPicture, str], None],
     ) -> None:
         self._clock, self._offset_ns, self._leave_out = clock, offset_ns, leave_out
         self._ahead = REORDERED if settled else 0
-        self._video, self.stills = VideoDecoder(name), StillDecoder(name, depth)
+        self._video, self.stills = VideoDecoder(name), stills
         self._reformatter = VideoReformatter()
         self._early: list[tuple[int, int, RecordedPicture]] = []
         self._count = 0

@@ -13,9 +13,11 @@ from pathlib import Path
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.capture.manifest import read_calibration
+from mvcodec.capture.recording_files import recording_files
 from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, add_output_options
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.encode_stream import (
+    GIVEN,
     Unfinished,
     add_stream_arguments,
     encode_stream,
@@ -51,8 +53,6 @@ from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codec import RateControl
 
 SUFFIX = ".mcap"
-GIVEN = "given"
-"""The matcher that takes what the input has."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -105,6 +105,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Encode; leaves no output where nothing was encoded, a proper one where something was."""
+    if not is_live(arguments):
+        arguments.input = [file for path in arguments.input for file in recording_files(path)]
     _check_output(arguments.output, arguments.input, overwrite=arguments.overwrite or arguments.dry_run)
     _check_effect(arguments)
     writer = (

@@ -15,7 +15,8 @@ from mvcodec.array import CameraArray
 from mvcodec.capture.live_cameras import LiveCameras
 from mvcodec.capture.manifest import read_calibration
 from mvcodec.capture.recording import Recording
-from mvcodec.capture.recording_settings import RecordingSettings
+from mvcodec.capture.recording_settings import RecordingSettings, TopicGrid
+from mvcodec.capture.sync_topics import with_offsets
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_options import add_patience, is_live, live_cameras
 from mvcodec.cli.live_view_option import live_view
@@ -38,8 +39,10 @@ from mvcodec.output.live_view import LiveView
 from mvcodec.settings import settings_of
 
 SUFFIX = ".mcap"
+GIVEN = "given"
+"""The matcher that takes what the input has."""
 
-STREAM_SETTINGS = ("topics", "when_behind", "clock", "patience_s")
+STREAM_SETTINGS = ("topics", "depth_topics", "when_behind", "clock", "patience_s")
 DEFAULT_WHEN_BEHIND: WhenBehind = "block"
 
 
@@ -54,6 +57,11 @@ def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
         "--topics",
         metavar="T,T;T,T",
         help="the video or image topic of every view: rows separated by ; or one list with --grid",
+    )
+    group.add_argument(
+        "--depth-topics",
+        metavar="T,T;T,T",
+        help="the depth topic of every view, for --matcher given: 16UC1 (mm), 32FC1 (m) or compressedDepth",
     )
     group.add_argument(
         "--when-behind",
@@ -164,11 +172,11 @@ def _opened(arguments: argparse.Namespace) -> Iterator[Recording | LiveCameras]:
         return
     if arguments.split is not None:
         raise SettingError("split", "with a recording", "an input of video or picture files")
-    if arguments.sync is not None:
-        raise SettingError("sync", f"{arguments.sync} with a recording", "an input of video or picture files")
+    if arguments.sync == "audio":
+        raise SettingError("sync", "audio with a recording", "motion: a recording's topics have no sound")
     timing = timing_of(arguments)
     settings = RecordingSettings(
-        topics=_topic_grid(arguments),
+        topics=_topic_grid("--topics", arguments.topics, arguments.grid),
         real=arguments.real,
         fps=timing.fps,
         tolerance_ms=timing.tolerance_ms,
@@ -176,16 +184,23 @@ def _opened(arguments: argparse.Namespace) -> Iterator[Recording | LiveCameras]:
         clock=arguments.clock or settings_of(RecordingSettings)["clock"].default,
         offsets_ms=timing.offsets_ms,
         bits=arguments.bits,
+        depth_topics=_depth_grid(arguments),
     )
     on_damage = reading_of(arguments).on_unreadable
     paths: list[Path] = arguments.input
     if str(paths[0]) == STANDARD:
+        if arguments.sync is not None:
+            raise SettingError("sync", f"motion with {INPUT_NAME}", "a file, which can be read twice")
         yield Recording(standard_input(), INPUT_NAME, settings, on_damage=on_damage)
         return
     name = str(paths[0]) if len(paths) == 1 else f"{paths[0]} ... {paths[-1]}"
     with ExitStack() as files:
-        parts = [files.enter_context(_binary(path)) for path in paths]
-        yield Recording(parts, name, settings, on_damage=on_damage)
+
+        def opened(asked: RecordingSettings) -> Recording:
+            parts = [files.enter_context(_binary(path)) for path in paths]
+            return Recording(parts, name, asked, on_damage=on_damage)
+
+        yield opened(settings if arguments.sync is None else with_offsets(settings, opened))
 
 
 def _binary(path: Path) -> BinaryIO:
@@ -195,23 +210,26 @@ def _binary(path: Path) -> BinaryIO:
         raise InputError(path, error.strerror, "a file that can be read") from None
 
 
-def _topic_grid(arguments: argparse.Namespace) -> tuple[tuple[str, ...], ...]:
-    if arguments.topics is None:
-        expected = "the topic of every view, such as '/a,/b;/c,/d'"
-        raise SettingError("--topics", "nothing", expected)
-    rows = tuple(
-        tuple(topic.strip() for topic in row.split(",")) for row in arguments.topics.strip(";").split(";")
-    )
+def _depth_grid(arguments: argparse.Namespace) -> TopicGrid | None:
+    if arguments.depth_topics is None:
+        return None
+    if str(arguments.matcher).split(":")[0] != GIVEN:
+        raise SettingError("--depth-topics", arguments.depth_topics, f"--matcher {GIVEN}, which codes them")
+    return _topic_grid("--depth-topics", arguments.depth_topics, arguments.grid)
+
+
+def _topic_grid(option: str, text: str | None, grid: tuple[int, int] | None) -> TopicGrid:
+    if text is None:
+        raise SettingError(option, "nothing", "the topic of every view, such as '/a,/b;/c,/d'")
+    rows = tuple(tuple(topic.strip() for topic in row.split(",")) for row in text.strip(";").split(";"))
     if not all(all(row) for row in rows):
-        expected = "a topic for every view, such as '/a,/b;/c,/d'"
-        raise SettingError("--topics", repr(arguments.topics), expected)
-    if arguments.grid is None:
+        raise SettingError(option, repr(text), "a topic for every view, such as '/a,/b;/c,/d'")
+    if grid is None:
         return rows
     names = [name for row in rows for name in row]
-    if len(names) != arguments.grid[0] * arguments.grid[1]:
-        found = f"{len(names)} topics"
-        raise SettingError("--topics", found, f"{arguments.grid[0]}x{arguments.grid[1]} as --grid says")
-    cols = arguments.grid[1]
+    if len(names) != grid[0] * grid[1]:
+        raise SettingError(option, f"{len(names)} topics", f"{grid[0]}x{grid[1]} as --grid says")
+    cols = grid[1]
     return tuple(tuple(names[at : at + cols]) for at in range(0, len(names), cols))
 
 

@@ -48,10 +48,10 @@ def live_cameras(arguments: argparse.Namespace) -> Iterator[LiveCameras]:
         SettingError: options that don't fit them.
         InputError: nothing comes.
     """
-    for option in ("topics", "split", "bits", "sync"):
+    for option in ("topics", "depth_topics", "split", "bits", "sync"):
         found = getattr(arguments, option)
         if found is not None:
-            raise SettingError(f"--{option}", found, "no such option with live cameras")
+            raise SettingError(option, found, "no such option with live cameras")
     count = len(arguments.input)
     if arguments.grid is None and count > 1:
         raise SettingError("--grid", "nothing", f"RxC of {count} cameras in row order")

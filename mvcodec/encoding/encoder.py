@@ -254,8 +254,12 @@ class Encoder:
         span = self.config.disparity_range_px
         if span is None:
             from mvcodec.stereo.disparity_range import estimate_range
+            from mvcodec.stereo.given import Given, given_range
 
-            span = estimate_range(self.array, [frames], self.array.disparity_hint_px)
+            if isinstance(self._matcher, Given) and frames.given:
+                span = given_range([frames])
+            else:
+                span = estimate_range(self.array, [frames], self.array.disparity_hint_px)
         codec, cameras = self.config.codec, self.config.cameras_for(self.array)
         maps = None if cameras == "none" else self.config.rate_of_maps(self.array, span)
         settings, use = self._settings_record(maps), self.config.use_for(self.array)
