@@ -19,7 +19,7 @@ _OTHERS = {
     ".mcap.zstd": "a recording that rosbag2 compressed as a file",
     ".db3.zstd": "a rosbag2 recording in SQLite, compressed as a file",
 }
-_CONVERT = "MCAP: rosbags-convert --src IN --dst OUT --dst-storage mcap (package rosbags) converts it"
+_CONVERT = "MCAP: rosbags-convert (package rosbags) converts it, see docs/recordings.md"
 _UNPACK = "MCAP: zstd -d unpacks it"
 
 
