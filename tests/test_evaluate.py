@@ -342,6 +342,10 @@ def test_bad_settings_are_told_before_anything_is_measured(
 
 def test_a_file_is_no_report(array: Path, tmp_path: Path) -> None:
     (tmp_path / "r").write_text("x")
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "thesis.tex").touch()
+    line = fails(1, "evaluate", array, "--output", tmp_path / "own")
+    assert line.endswith("it holds other things, such as thesis.tex; name another folder")
     assert "a report is a folder" in fails(1, "evaluate", array, "--output", tmp_path / "r")
 
 

@@ -17,6 +17,7 @@ from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesize
 from mvcodec.cli.cluster_options import add_cluster, place
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.layer_options import add_layer, layer_settings
+from mvcodec.cli.paths import check_folder_target
 from mvcodec.cli.progress import progress
 from mvcodec.cluster.connection import connected
 from mvcodec.cluster.places import Place
@@ -44,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="REPORT",
-        help="a folder; points that it holds already are not measured again",
+        help="a folder for the report alone; points that it holds already are not measured again",
     )
     parser.add_argument(
         "--qp", type=_whole_numbers, metavar="N,N..", help="of the pictures (default: 22,27,32,37)"
@@ -83,6 +84,10 @@ def run(arguments: argparse.Namespace) -> None:
     output: Path = arguments.output
     if output.exists() and not output.is_dir():
         raise OutputError(output, "it is a file; a report is a folder")
+    from mvcodec.evaluation.report import FILES
+
+    names = "|".join(map(re.escape, (*FILES, POINTS)))
+    check_folder_target(output, names, overwrite=True)  # a report that is there is brought up to date
     with ExitStack() as stack:
         _evaluate(arguments, stack)
 

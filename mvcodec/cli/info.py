@@ -74,10 +74,13 @@ def _rate(settings: Mapping[str, Any]) -> str:
 
 
 def _recorded(info: StreamInfo) -> str:
-    """When the pictures were taken, where their times are of a clock and don't count from 0."""
+    """When the pictures were taken, where their times are of a clock and don't count from 0.
+
+    The header has no date of its own, so that the same input gives the same file.
+    """
     first_s = info.span_ns[0] / 1e9
     if first_s < FIRST_DATED_S:
-        return ""
+        return ", times without a date"
     moment = datetime.fromtimestamp(first_s, UTC)
     return f", pictures from {moment:%Y-%m-%d %H:%M:%S} UTC on"
 
