@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import struct
@@ -9,7 +10,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import pytest
 from coding import RANGE_PX, Pipe, encode, encoded_file, make_array
@@ -43,6 +44,12 @@ def _written(coded: Iterable[list[Packet]]) -> bytes:
         for packets in coded:
             writer.push(packets)
     return target.getvalue()
+
+
+def _push_all(writer: McapWriter, coded: Iterable[list[Packet]]) -> None:
+    with writer:
+        for packets in coded:
+            writer.push(packets)
 
 
 def _numbers(reader: McapReader, *ends: int) -> list[int]:
@@ -315,3 +322,36 @@ def test_the_container_costs_little() -> None:
     """Of a second of four small cameras, less than 300 bytes a frame set and 7 kB once."""
     info = read_info(io.BytesIO(encoded_file(ARRAY, 10, qp=20)))
     assert info.bits.other / 8 < 7000 + 300 * 10
+
+
+class _FullDisk(io.BytesIO):
+    """Takes so many bytes, then no more."""
+
+    def __init__(self, room: int) -> None:
+        super().__init__()
+        self._room = room
+
+    def write(self, data: Any, /) -> int:
+        if self.tell() + len(data) > self._room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return super().write(data)
+
+
+def test_a_writer_counts_what_is_surely_in_the_file(coded: list[list[Packet]], file: bytes) -> None:
+    whole = McapWriter(io.BytesIO())
+    _push_all(whole, coded)
+    assert whole.written_count == len(coded)
+
+    disk = _FullDisk(len(file) // 2)
+    cut = McapWriter(disk)
+    with pytest.raises(OutputError, match="No space left on device"):
+        _push_all(cut, coded)
+    with pytest.warns(MvCodecWarning):
+        readable = _numbers(McapReader(io.BytesIO(disk.getvalue()), "cut"))
+    assert 0 < cut.written_count < cut.frame_count <= len(coded)
+    assert cut.written_count <= len(readable) < len(coded)
+
+
+def test_a_folder_is_told_from_a_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="found a folder, expected an MCAP file, which `mvcodec encode`"):
+        McapReader.open(tmp_path)

@@ -93,3 +93,10 @@ def test_the_command_writes_what_encode_reads(tmp_path: Path) -> None:
     assert after.array.fps == 30
     assert "-y overwrites it" in fails(1, "init", folder)
     succeeds("init", folder, "-y", "--quiet")
+
+
+def test_a_folder_that_is_not_there_is_told_from_an_empty_one(tmp_path: Path) -> None:
+    missing = tmp_path / "missing"
+    assert "missing: found nothing there, expected a folder of pictures or videos" in fails(
+        1, "init", missing
+    )

@@ -239,7 +239,7 @@ def _encode(
                 writer.push(packets)
                 bar.update()
     except (MvCodecError, OSError, KeyboardInterrupt) as error:
-        held = writer.frame_count
+        held = writer.written_count
         if not held:
             raise
         reason = str(error) or "interrupted"

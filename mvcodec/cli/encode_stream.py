@@ -153,9 +153,9 @@ def _run(
             live.run(frame_sets, interrupted, bar.update)
             writer.note({DROPPED_KEY: str(live.dropped)})
     except (MvCodecError, OSError) as error:
-        if not writer.frame_count or str(arguments.output) == STANDARD:
+        if not writer.written_count or str(arguments.output) == STANDARD:
             raise
-        raise Unfinished(f"{error}; {arguments.output} holds {writer.frame_count} frame sets") from error
+        raise Unfinished(f"{error}; {arguments.output} holds {writer.written_count} frame sets") from error
     if not writer.frame_count:
         raise InputError(source.name, "no frame set of all cameras", "one at least")
     if live.dropped:

@@ -74,6 +74,8 @@ class ChunkedFile:
         self.channels: dict[str, int] = {}
         self._chunk_start_ns: int | None = None
         self._chunk_bytes = 0
+        self._sets_in_chunk = 0
+        self.sets_written = 0
 
     @property
     def is_open(self) -> bool:
@@ -139,6 +141,7 @@ class ChunkedFile:
 
     def end_set(self) -> None:
         """End the frame set; without chunk time it is written now."""
+        self._sets_in_chunk += 1
         if not self._chunk_ns:
             self._end_chunk()
 
@@ -150,6 +153,7 @@ class ChunkedFile:
                     self._mcap.finish()  # type: ignore[no-untyped-call]
                 if self._file is not None:
                     self._file.close()  # a file that was handed in stays open: see _Pipe
+                self._count_chunk()
         finally:
             if self._file is not None:
                 # After a failure the buffer would be written again, and fail again, at exit.
@@ -171,6 +175,11 @@ class ChunkedFile:
                 descriptor = self._file.fileno()
                 if stat.S_ISREG(os.fstat(descriptor).st_mode):
                     os.fsync(descriptor)
+            self._count_chunk()
+
+    def _count_chunk(self) -> None:
+        self.sets_written += self._sets_in_chunk
+        self._sets_in_chunk = 0
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

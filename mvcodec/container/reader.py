@@ -94,6 +94,9 @@ class McapReader(Closing):
             return cls(source, name, limits, on_damage, depth=depth, layer=layer)
         try:
             file = open_url(str(source)) if is_url(str(source)) else Path(source).open("rb")  # noqa: SIM115
+        except IsADirectoryError:
+            expected = "an MCAP file, which `mvcodec encode` makes of an array folder"
+            raise InputError(source, "a folder", expected) from None
         except OSError as error:
             raise InputError(source, error.strerror, "a file that can be read") from None
         try:

@@ -49,6 +49,11 @@ class McapWriter(Closing):
         self._closed = False
         self.frame_count = 0
 
+    @property
+    def written_count(self) -> int:
+        """How many of the frame sets pushed are surely in the file; all, once it is closed."""
+        return self._file.sets_written
+
     def push(self, packets: Sequence[Packet]) -> None:
         """Write one frame set's packets, as `Encoder.push` returns them (the header's first).
 
