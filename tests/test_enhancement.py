@@ -23,7 +23,7 @@ from mvcodec.conformance.validation import validate
 from mvcodec.container import McapReader, McapWriter
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
-from mvcodec.encoding.enhancer import enhanced_views
+from mvcodec.encoding.enhancer import enhanced_views, layer_order
 from mvcodec.enhancement import LAYER_TRACK, EnhancedView, EnhancementHeader
 from mvcodec.errors import InputError, MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import DecodedSet, FrameSet
@@ -33,6 +33,10 @@ from mvcodec.synthesis.synthesizers import make_synthesizer
 ARRAY = CameraArray(3, 3, 96, 64, 10.0, (0, 2), (0, 2), make_array(96, 64).calibration)
 VIRTUAL = [view for view in ARRAY.positions if view not in ARRAY.real]
 ENHANCED = Track(TrackKind.ENHANCED, (1, 1))
+"""All other views build on this one."""
+
+LEAF = Track(TrackKind.ENHANCED, (2, 1))
+"""Nothing builds on this one."""
 
 
 def frames(count: int) -> list[FrameSet]:
@@ -98,7 +102,7 @@ def test_enhanced_views_are_nearer_to_their_originals(coded: list[list[Packet]])
     base, better = decoded(file, ()), decoded(file)
     for number, taken in enumerate(frames(4)):
         assert base[number].enhanced == {}
-        assert list(better[number].enhanced) == VIRTUAL
+        assert sorted(better[number].enhanced) == VIRTUAL
         for view in VIRTUAL:
             original, place = taken.pictures[view], Viewpoint(*view)
             shown = synthesizer.render(better[number], place)
@@ -130,24 +134,42 @@ def test_some_views_can_be_asked_for() -> None:
 
 def test_the_layer_stands_on_predicted_cameras_too() -> None:
     found = decoded(written(encode(2, prediction="synthesis")))
-    assert all(list(each.enhanced) == VIRTUAL for each in found)
+    assert all(sorted(each.enhanced) == VIRTUAL for each in found)
 
 
 def test_a_missing_or_damaged_unit_is_told_once_and_healed_by_the_next_keyframe(
     coded: list[list[Packet]],
 ) -> None:
     sets = [list(packets) for packets in coded]
-    sets[0] = [packet for packet in sets[0] if packet.track != ENHANCED]
-    with pytest.warns(MvCodecWarning, match="view r01_c01 is shown from the base meanwhile") as told:
+    sets[0] = [packet for packet in sets[0] if packet.track != LEAF]
+    with pytest.warns(MvCodecWarning, match="view r02_c01 is shown from the base meanwhile") as told:
         found = pushed(sets)
     assert len(told) == 1
-    assert [(1, 1) in each.enhanced for each in found] == [False, False, True, True]
+    assert [(2, 1) in each.enhanced for each in found] == [False, False, True, True]
     assert all((0, 1) in each.enhanced for each in found)
     sets = [list(packets) for packets in coded]
-    sets[1] = [replace(p, data=p.data[:9]) if p.track == ENHANCED else p for p in sets[1]]
-    with pytest.warns(MvCodecWarning, match="view r01_c01 is shown from the base"):
+    sets[1] = [replace(p, data=p.data[:9]) if p.track == LEAF else p for p in sets[1]]
+    with pytest.warns(MvCodecWarning, match="view r02_c01 is shown from the base"):
         found = pushed(sets)
-    assert [(1, 1) in each.enhanced for each in found] == [True, False, True, True]
+    assert [(2, 1) in each.enhanced for each in found] == [True, False, True, True]
+
+
+def test_without_a_view_those_that_build_on_it_are_shown_from_the_base_too(coded: list[list[Packet]]) -> None:
+    sets = [list(packets) for packets in coded]
+    sets[1] = [packet for packet in sets[1] if packet.track != ENHANCED]
+    with pytest.warns(MvCodecWarning, match="is shown from the base meanwhile") as told:
+        found = pushed(sets)
+    assert len(told) == len(VIRTUAL)
+    assert [len(each.enhanced) for each in found] == [5, 0, 5, 5]
+
+
+def test_each_view_is_predicted_from_what_is_nearest_and_decoded_before() -> None:
+    order = layer_order(ARRAY, VIRTUAL)
+    assert order[0] == EnhancedView((1, 1), ARRAY.real)
+    assert {each.view for each in order[1:] if (1, 1) in each.references} == {(0, 1), (1, 0), (1, 2), (2, 1)}
+    line = CameraArray(1, 5, 96, 64, 10.0, (0,), (0, 4), make_array(96, 64).calibration)
+    views = [each.view for each in layer_order(line, [(0, 1), (0, 2), (0, 3)])]
+    assert views == [(0, 2), (0, 1), (0, 3)]
 
 
 def test_another_base_is_told_by_the_checksum(coded: list[list[Packet]]) -> None:
@@ -196,7 +218,7 @@ def test_layer_headers_that_cannot_be_are_refused(coded: list[list[Packet]]) -> 
     assert coded[0][1].track == LAYER_TRACK
     good = json.loads(coded[0][1].data)
     found = EnhancementHeader.from_json(coded[0][1].data, header, "x")
-    assert found.views[0] == EnhancedView((0, 1), ARRAY.real)
+    assert found.views[0] == EnhancedView((1, 1), ARRAY.real)
     assert found.to_json() == coded[0][1].data
     for change, message in (
         ({"version": 2}, "an enhancement layer of"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from mvcodec.array import CameraArray, Position, Viewpoint
+from mvcodec.array import CameraArray, Position
 from mvcodec.encoding.layer_rate import MOST_TRIES, LayerRate
 from mvcodec.encoding.predicted_cameras import SPEEDS
 from mvcodec.enhancement import LAYER_TRACK, EnhancedView, EnhancementHeader
@@ -22,6 +22,9 @@ from mvcodec.video.vp9_reference import (
     Vp9ReferenceEncoder,
 )
 from mvcodec.workers import run_all
+
+REFERENCES = 4
+"""Decoded pictures that a view is predicted from: of 3, 4 and 6 the cheapest (`docs/measurements.md`)."""
 
 
 def enhanced_views(array: CameraArray, asked: Collection[Position] | None) -> tuple[Position, ...]:
@@ -43,8 +46,21 @@ def enhanced_views(array: CameraArray, asked: Collection[Position] | None) -> tu
 
 
 def layer_order(array: CameraArray, views: Sequence[Position]) -> tuple[EnhancedView, ...]:
-    """Each view from the real cameras of its cell."""
-    return tuple(EnhancedView(view, array.cell_at(Viewpoint(*view)).cameras) for view in views)
+    """The view that is farthest from all that is decoded comes next, from what is nearest to it."""
+
+    def away(one: Position, other: Position) -> float:
+        down = (one[0] - other[0]) / max(array.row_step, 1)
+        across = (one[1] - other[1]) / max(array.col_step, 1)
+        return down * down + across * across
+
+    left, decoded, order = list(views), list(array.real), []
+    while left:
+        view = max(left, key=lambda view: min(away(view, other) for other in decoded))
+        nearest = sorted(decoded, key=lambda other: (away(view, other), other))[:REFERENCES]
+        order.append(EnhancedView(view, tuple(sorted(nearest))))
+        left.remove(view)
+        decoded.append(view)
+    return tuple(order)
 
 
 class Enhancer:
