@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from browser_page import CHROMIUM, NO_CHROMIUM
+from coding import encoded_file, make_array
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from player_files import damage
@@ -147,3 +150,60 @@ def test_a_header_that_asks_for_too_much_is_refused(tab: Page, site: Site) -> No
         writer.add_message(channel, 0, json.dumps(header).encode(), 0, 0)
         writer.finish()  # type: ignore[no-untyped-call]
     assert "pixels of a frame set" in str(read(tab, site, "hostile.mcap"))
+
+
+def changed(source: Path, target: Path, change: Callable[[int, str, bytes], bytes | None]) -> None:
+    """A copy with other messages: `change` gets a frame set's number, topic and data; None leaves it out."""
+    with source.open("rb") as file, target.open("wb") as out:
+        reader = make_reader(file)
+        writer = Writer(out)
+        writer.start()
+        channels: dict[int, int] = {}
+        for schema, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.id not in channels:
+                assert schema is not None
+                named = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, named)
+            data = change(message.sequence, channel.topic, message.data)
+            if data is not None:
+                writer.add_message(
+                    channels[channel.id], message.log_time, data, message.publish_time, message.sequence
+                )
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+@pytest.mark.parametrize("codec", ["h264", "av1", "vp9"])
+def test_pictures_that_build_on_a_lost_one_are_not_shown(tab: Page, site: Site, codec: str) -> None:
+    site.put("whole.mcap", encoded_file(make_array(), 8, gop=4, codec=codec))
+    whole = read(tab, site, "whole.mcap")
+    tracks = whole["pictures"] // 8
+    assert whole["troubles"] == []
+    changed(
+        site.folder / "whole.mcap", site.folder / "lost.mcap", lambda n, _, data: None if n == 2 else data
+    )
+    lost = read(tab, site, "lost.mcap")
+    assert lost["count"] == 7
+    assert lost["pictures"] == tracks * (2 + 4)  # up to the lost one, and from the next keyframe on
+    assert any("cannot be decoded" in text for text in lost["troubles"])
+
+
+@pytest.mark.parametrize("kind", ["header", "nal"])
+def test_damaged_headers_and_pictures_do_not_hang_the_page(tab: Page, site: Site, kind: str) -> None:
+    """Each of the corpus in place of a whole file's first header, or of a picture between two keyframes."""
+    files = sorted((CORPUS / kind).iterdir())
+    assert files
+    tab.goto(f"{site.url}/blank.html")
+    for path in files:
+        damaged = path.read_bytes()
+        if kind == "nal":
+            damaged = CompressedVideo(data=damaged, format="h264").SerializeToString()
+        place = (0, "/mvcodec/header") if kind == "header" else (1, "/camera/r00_c00/video")
+
+        def change(number: int, topic: str, data: bytes) -> bytes:
+            return damaged if (number, topic) == place else data  # noqa: B023
+
+        changed(SAMPLE, site.folder / "damaged.mcap", change)
+        found = tab.evaluate(READ, ["damaged.mcap", 6])
+        assert found["refused"].startswith(("FileError", "NoDecoder")) or not found["refused"], (path, found)
+        if kind == "nal":
+            assert found["pictures"] >= 6 * 8 - 2, (path, found)  # all but those of this track and group

@@ -152,7 +152,7 @@ export class FrameStore {
   async #unit(topic: string, frame: number): Promise<Unit> {
     const span = spanAt(this.#recording.spans, frame);
     const set = (await this.#recording.load(span))[frame - span.first];
-    return { frame, isKey: set?.isKey ?? false, data: set?.units.get(topic) };
+    return { frame, isKey: set?.isKey ?? false, sequence: set?.sequence ?? -1, data: set?.units.get(topic) };
   }
 
   async #keyBefore(frame: number): Promise<number> {

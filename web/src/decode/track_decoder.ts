@@ -2,12 +2,15 @@
 
 import type { Codec } from "../container/header.ts";
 import { codecString } from "./codec_string.ts";
+import { pictureOrder, type PictureOrder } from "./picture_order.ts";
 import { takePlanes, type Planes } from "./planes.ts";
 
 /** A coded picture of a track; undefined where it is missing. */
 export interface Unit {
   readonly frame: number;
   readonly isKey: boolean;
+  /** Number of its frame set in the encoder's input. */
+  readonly sequence: number;
   readonly data: Uint8Array | undefined;
 }
 
@@ -31,10 +34,12 @@ export class TrackDecoder {
   #next = -1;
   readonly #outputs = new Set<number>();
   #wake: () => void = () => {};
+  readonly #order: PictureOrder;
 
   /** `deliver` gets every picture that comes out, by its frame number. */
   constructor(codec: Codec, deliver: (frame: number, planes: Planes) => void) {
     this.#codec = codec;
+    this.#order = pictureOrder(codec);
     this.#deliver = deliver;
   }
 
@@ -74,7 +79,9 @@ export class TrackDecoder {
     this.#failure = undefined;
     for (const unit of units) {
       if (unit.isKey && unit.data !== undefined && this.#next !== unit.frame) await this.#start(unit.data);
-      if (unit.data === undefined || this.#decoder?.state !== "configured") this.reset();
+      const isWhole = this.#follows(unit);
+      if (!isWhole && unit.frame > frame) break; // what is waited for comes before it
+      if (!isWhole || this.#decoder?.state !== "configured") this.reset();
       if (this.#next < 0 && !(unit.isKey && unit.data !== undefined && this.#decoder !== undefined)) continue;
       await this.#room();
       if (this.#decoder?.state !== "configured") return false;
@@ -84,6 +91,15 @@ export class TrackDecoder {
       this.#next = unit.frame + 1;
     }
     return this.#next > frame && (await this.#output(frame));
+  }
+
+  /** Whether it is there, and so is all that it builds on. */
+  #follows({ data, isKey, sequence }: Unit): boolean {
+    try {
+      return data !== undefined && this.#order.follows(data, isKey, sequence);
+    } catch {
+      return false;
+    }
   }
 
   async #start(key: Uint8Array): Promise<void> {

@@ -112,6 +112,12 @@ export class MvcodecPlayer extends HTMLElement {
     await this.#engine!.look({ row, col });
   }
 
+  /** Resolves when the picture stands, in full detail. Not while it plays. */
+  async settled(): Promise<void> {
+    await this.ready;
+    await this.#engine!.settled();
+  }
+
   /** What is on the screen, and how it is played. Undefined before a file is open. */
   get shown(): ShownState | undefined {
     const engine = this.#engine;

@@ -160,6 +160,17 @@ export class Engine {
     return this.#settled();
   }
 
+  /** Resolves when what is asked for is on the screen, with all detail. */
+  async settled(): Promise<void> {
+    await this.#settled();
+    await new Promise<void>((resolve) => {
+      const isDone = () => this.#isFinal && !this.#isDirty && this.#decoded?.frame === this.shown.frame;
+      this.#waiters.push({ isDone, resolve });
+      this.#standsSoon();
+      this.wake();
+    });
+  }
+
   play(): void {
     if (this.#recording === undefined || this.count < 2) return;
     this.playback.play(this.timeOf(this.shown.frame));

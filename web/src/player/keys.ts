@@ -31,7 +31,7 @@ export function keyActions(ui: Ui): ReadonlyMap<string, () => void> {
     ["e", () => ui.nextEyes()],
     ["w", () => ui.dolly(0.2)],
     ["s", () => ui.dolly(-0.2)],
-    ["h", () => void (ui.looking.hovers = !ui.looking.hovers)],
+    ["h", () => ui.toggleHover()],
     ["p", () => ui.savePicture()],
     ["c", () => void ui.copyLink()],
     ["o", () => ui.openFile()],

@@ -42,6 +42,8 @@ export const TEXTS = {
     disagreement: "Disagreement of the cameras",
   },
   eyes: { one: "One view", "side by side": "Side by side", anaglyph: "Red-cyan" },
+  follows: "The view follows the pointer",
+  followsNot: "The view does not follow the pointer",
   views: "Eyes",
   wipe: "Compare with the picture",
   focus: "Focus",

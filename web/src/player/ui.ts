@@ -231,6 +231,12 @@ export class Ui {
     this.update();
   }
 
+  /** Follow the pointer, or not. */
+  toggleHover(): void {
+    this.looking.hovers = !this.looking.hovers;
+    this.#spoken.textContent = this.looking.hovers ? TEXTS.follows : TEXTS.followsNot;
+  }
+
   toggleStatistics(): void {
     this.#stats.hidden = !this.#stats.hidden;
     this.update();

@@ -1,0 +1,217 @@
+"""What the page's player offers besides looking: files, links, pictures to keep, comparing, focus, touch."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+from browser_page import CHROMIUM, NO_CHROMIUM
+from numpy.typing import NDArray
+from player_files import Running, decode_picture, playing
+from playwright.sync_api import Page, expect
+from web_fixtures import Site, open_player, pixels_of
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
+pytest_plugins = ("web_fixtures",)
+
+PAIRS = Path(__file__).parent / "conformance"
+SAMPLE = PAIRS / "square.mcap"
+"""3 x 3 views of 64 x 48, six frames, ten a second."""
+OTHER = PAIRS / "odd_size.mcap"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Running]:
+    with playing(SAMPLE, renderer="web") as running:
+        yield running
+
+
+@pytest.fixture
+def page(tab: Page, server: Running) -> Page:
+    """The page of `mvcodec play`, on view 1,1."""
+    tab.goto(f"{server.url}?view=1,1&t=0.2")
+    tab.evaluate("document.querySelector('mvcodec-player').ready")
+    return tab
+
+
+def waits_for(page: Page, condition: str) -> None:
+    """Wait until something holds of what is `shown`."""
+    page.wait_for_function(
+        f"() => {{ const shown = document.querySelector('mvcodec-player').shown; return {condition}; }}"
+    )
+
+
+def settled(page: Page) -> None:
+    """Wait until what is asked for is on the screen with all detail."""
+    page.evaluate("document.querySelector('mvcodec-player').settled()")
+
+
+def canvas(page: Page) -> NDArray[np.int16]:
+    """The upper part of the picture on the screen, which no controls cover, as signed numbers."""
+    settled(page)
+    shot = decode_picture(np.frombuffer(page.locator("canvas.picture").screenshot(), np.uint8))
+    return shot[: shot.shape[0] * 2 // 5].astype(np.int16)
+
+
+def toggle_menu(page: Page) -> None:
+    page.get_by_label("More").dispatch_event("click")  # the controls may have hidden by now
+
+
+def set_slider(page: Page, label: str, value: str) -> None:
+    page.get_by_label(label).fill(value)
+
+
+def test_a_file_that_is_dropped_is_shown(page: Page) -> None:
+    page.evaluate(
+        """(bytes) => {
+            const transfer = new DataTransfer();
+            transfer.items.add(new File([new Uint8Array(bytes)], "other.mcap"));
+            const player = document.querySelector("mvcodec-player");
+            const about = { dataTransfer: transfer, bubbles: true, cancelable: true };
+            player.dispatchEvent(new DragEvent("drop", about));
+            return player.ready;
+        }""",
+        list(OTHER.read_bytes()),
+    )
+    assert pixels_of(page).shape != (48, 64, 3)
+
+
+def test_a_file_that_is_chosen_is_shown(page: Page) -> None:
+    toggle_menu(page)
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Open a file").dispatch_event("click")
+    chooser.value.set_files(OTHER)
+    waits_for(page, "shown && shown.count !== 6")
+
+
+def test_a_copied_link_leads_back_to_the_view_and_time(page: Page) -> None:
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.evaluate("document.querySelector('mvcodec-player').look(0.5, 1.75)")
+    page.keyboard.press("c")
+    expect(page.get_by_role("alert")).to_contain_text("Link copied")
+    link = page.evaluate("navigator.clipboard.readText()")
+    page.goto("about:blank")
+    page.goto(link)
+    page.evaluate("document.querySelector('mvcodec-player').ready")
+    waits_for(page, "shown.frame === 2 && shown.view.row === 0.5 && shown.view.col === 1.75")
+
+
+def test_a_saved_picture_is_the_view(page: Page) -> None:
+    page.evaluate("document.querySelector('mvcodec-player').look(0.5, 0.5)")
+    with page.expect_download() as download:
+        page.keyboard.press("p")
+    saved = decode_picture(np.frombuffer(Path(download.value.path()).read_bytes(), np.uint8))
+    assert download.value.suggested_filename.endswith("-2.png")
+    assert np.array_equal(saved, pixels_of(page))
+
+
+def test_a_saved_clip_is_a_video_of_the_loop(page: Page) -> None:
+    page.keyboard.press("a")
+    page.keyboard.press("End")
+    waits_for(page, "shown.frame === 5")
+    page.keyboard.press("b")
+    toggle_menu(page)
+    with page.expect_download() as download:
+        page.get_by_text("Save clip").dispatch_event("click")
+    with av.open(io.BytesIO(Path(download.value.path()).read_bytes()), "r") as container:
+        pictures = [frame.to_ndarray(format="gray") for frame in container.decode(video=0)]
+    assert len(pictures) >= 2
+    assert np.mean(pictures[-1]) > 20
+
+
+def test_the_divider_has_the_picture_on_its_left_and_the_look_on_its_right(page: Page) -> None:
+    toggle_menu(page)
+    toggle_menu(page)
+    picture = canvas(page)
+    page.get_by_label("Show").select_option("disparity")
+    look = canvas(page)
+    toggle_menu(page)
+    set_slider(page, "Compare with the picture", "0.5")
+    toggle_menu(page)
+    both = canvas(page)
+    middle, margin = both.shape[1] // 2, 8
+    assert abs(both[:, : middle - margin] - picture[:, : middle - margin]).mean() < 1
+    assert abs(both[:, middle + margin :] - look[:, middle + margin :]).mean() < 1
+    assert abs(picture - look).mean() > 10
+
+
+def test_a_focus_blurs_what_is_elsewhere_and_goes_off_again(tab: Page, site: Site) -> None:
+    site.put("room.mcap", (PAIRS.parents[1] / "samples" / "room_2x2.mcap").read_bytes())
+    open_player(tab, site, "room.mcap")
+
+    def sharpness_of_the_wall(picture: NDArray[np.int16]) -> float:
+        width = picture.shape[1]
+        wall = picture[:, width // 3 : 2 * width // 3].astype(np.float32)
+        return float(cv2.Laplacian(wall, cv2.CV_32F).std())
+
+    sharp = canvas(tab)
+    toggle_menu(tab)
+    set_slider(tab, "Focus", "100")  # on what is nearest
+    blurred = canvas(tab)
+    set_slider(tab, "Focus", "0")
+    toggle_menu(tab)
+    assert sharpness_of_the_wall(blurred) < 0.5 * sharpness_of_the_wall(sharp)
+    assert abs(canvas(tab) - sharp).mean() < 1
+
+
+def test_the_bar_shows_a_small_picture_of_the_time_under_the_pointer(page: Page) -> None:
+    page.get_by_label("Time", exact=True).hover(position={"x": 200, "y": 10})
+    expect(page.locator(".peek canvas")).to_be_visible()
+    expect(page.locator(".peek")).to_contain_text("0:00.")
+    page.mouse.move(480, 100)
+    expect(page.locator(".peek")).to_be_hidden()
+
+
+def test_two_fingers_move_ahead(page: Page) -> None:
+    touch = page.context.new_cdp_session(page)
+
+    def fingers(kind: str, *columns: int) -> None:
+        points = [{"x": x, "y": 250, "id": i} for i, x in enumerate(columns)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    fingers("touchStart", 440, 520)
+    fingers("touchMove", 400, 560)
+    fingers("touchMove", 300, 660)
+    fingers("touchEnd")
+    waits_for(page, "shown.dolly > 0")
+
+
+def test_an_element_with_autoplay_plays(tab: Page, site: Site) -> None:
+    site.put("square.mcap", SAMPLE.read_bytes())
+    open_player(tab, site, "square.mcap", "autoplay")
+    waits_for(tab, "shown.isPlaying")
+    waits_for(tab, "shown.frame > 0")
+
+
+def test_the_view_follows_the_pointer_until_a_key_says_no(page: Page) -> None:
+    page.mouse.move(300, 250)
+    page.mouse.move(700, 250)
+    waits_for(page, "shown.view.col > 1")
+    page.keyboard.press("h")
+    expect(page.get_by_role("status").filter(has_text="does not follow")).to_have_count(1)
+    before = page.evaluate("document.querySelector('mvcodec-player').shown.view")
+    page.mouse.move(200, 250)
+    settled(page)
+    assert page.evaluate("document.querySelector('mvcodec-player').shown.view") == before
+
+
+def test_a_phone_that_is_turned_looks_around(page: Page) -> None:
+    page.evaluate("""() => {
+        for (const gamma of [0, 20]) {
+            dispatchEvent(new DeviceOrientationEvent("deviceorientation", { alpha: 0, beta: 10, gamma }));
+        }
+    }""")
+    waits_for(page, "shown.view.col > 1 && shown.view.row === 1")
+
+
+def test_a_hovered_look_says_disparity_and_metres(page: Page) -> None:
+    page.get_by_label("Show").select_option("disparity")
+    settled(page)
+    page.mouse.move(480, 250)
+    page.mouse.move(482, 252)
+    expect(page.locator(".probe")).to_contain_text("px")
