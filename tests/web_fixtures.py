@@ -118,18 +118,18 @@ def _is_foreign(url: str) -> bool:
     )
 
 
-def pixels_of(page: Page, selector: str = "mvcodec-player") -> Picture:
-    """What the player's `pixels()` gives, as RGB."""
+def pixels_of(page: Page, selector: str = "mvcodec-player", fine: bool = True) -> Picture:
+    """What the player's `pixels()` gives, as RGB: as the picture stands or, not `fine`, as it moves."""
     width, height, data = page.evaluate(
-        """(selector) => {
-            const { width, height, data } = document.querySelector(selector).pixels();
+        """([selector, fine]) => {
+            const { width, height, data } = document.querySelector(selector).pixels(fine);
             let text = "";
             for (let i = 0; i < data.length; i += 32768) {
                 text += String.fromCharCode(...data.subarray(i, i + 32768));
             }
             return [width, height, btoa(text)];
         }""",
-        selector,
+        [selector, fine],
     )
     return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4)[..., :3]
 

@@ -135,10 +135,10 @@ export class MvcodecPlayer extends HTMLElement {
     this.#engine?.pause();
   }
 
-  /** The view that is shown, at picture size. Throws Error before the first picture. */
-  pixels(): Pixels {
+  /** The view that is shown, at picture size: as it stands or, not `fine`, as it moves. Throws Error before the first picture. */
+  pixels(fine = true): Pixels {
     if (this.#engine === undefined) throw new Error("no picture yet");
-    return this.#engine.pixels();
+    return this.#engine.pixels(fine);
   }
 
   #openFirst(): void {

@@ -184,11 +184,11 @@ export class Engine {
     this.wake();
   }
 
-  /** The view that is shown, at picture size, whatever the screen shows of it. Throws Error before the first picture. */
-  pixels(): Pixels {
+  /** The view that is shown, at picture size, whatever the screen shows of it: as it stands or, not `fine`, as it moves. Throws Error before the first picture. */
+  pixels(fine = true): Pixels {
     if (this.#renderer === undefined || this.#decoded === undefined) throw new Error("no picture yet");
     const { view, look, dolly } = this.shown;
-    const pixels = this.#renderer.read(this.#decoded.frames, view, { look, fine: true, dolly });
+    const pixels = this.#renderer.read(this.#decoded.frames, view, { look, fine, dolly });
     this.#draw(true); // the canvas may have lost what it showed
     return pixels;
   }
