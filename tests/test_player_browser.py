@@ -36,7 +36,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 STILL_MS = 1000  # several frames at half speed
 LOOK_KEYS = {
     "d": "disparity",
-    "l": "layers",
+    "y": "layers",
     "p": "provenance",
     "x": "difference",
     "a": "anaglyph",
@@ -50,12 +50,22 @@ def test_loads_and_shows_the_middle(page: Page, server: Running, file: Path) -> 
     show(page, server)
     assert on_screen(page) == (0, 1.0, 1.0)
     assert psnr(rendered(file, 0, 1, 1), pixels(page)) > SAME_DB
-    assert page.inner_text("#frame") == f"frame 0 of {FRAMES - 1}"
-    assert page.inner_text("#time") == "0.000 s"
-    assert page.inner_text("#viewpoint") == "view 1.00, 1.00"
+    assert page.inner_text("#time") == "0:00.0 / 0:00.5"
     assert page.locator("#map .real").count() == 4
-    for part in ("fps", "decode", "synthesis", "transfer", "dropped"):
+    assert page.is_hidden("#stats")
+    page.keyboard.press("i")
+    for part in (
+        "frame 0",
+        "0.000 s",
+        "view 1.00, 1.00",
+        "fps",
+        "decode",
+        "synthesis",
+        "transfer",
+        "dropped",
+    ):
         assert part in page.inner_text("#stats")
+    page.keyboard.press("i")
     box = box_of(page, "canvas")
     assert (box["width"], box["height"]) == (1280, 720)
     screenshot(page, "picture")
@@ -68,8 +78,7 @@ def test_steps_exactly_one_frame(page: Page, server: Running, file: Path) -> Non
         shows(page, frame=frame)
         own, next_one = (rendered(file, number, 1, 1) for number in (frame, (frame + 1) % FRAMES))
         assert psnr(own, pixels(page)) > max(SAME_DB, psnr(next_one, pixels(page)))
-    page.mouse.move(640, 300)
-    page.mouse.wheel(0, 120)
+    page.keyboard.press("l")
     shows(page, frame=2)
     page.click("#back")
     shows(page, frame=1)
@@ -90,6 +99,22 @@ def test_plays_loops_and_pauses(page: Page, server: Running) -> None:
     page.keyboard.press(" ")
     page.wait_for_selector("#play[aria-pressed=false]")
     stands_still(page, STILL_MS)
+
+
+def test_it_says_how_to_look_around_and_a_click_plays(page: Page, server: Running) -> None:
+    page.goto(server.url)
+    page.wait_for_selector("#hint:has-text('Drag to look around')")
+    page.wait_for_selector("#big")
+    assert page.is_hidden("#wait")
+    page.mouse.click(640, 200)
+    page.wait_for_selector("#play[aria-pressed=true]")
+    assert page.is_hidden("#hint")
+    assert page.is_hidden("#big")
+    page.keyboard.press("k")
+    page.wait_for_selector("#play[aria-pressed=false]")
+    page.wait_for_selector("body.idle")
+    page.mouse.move(600, 210)
+    page.wait_for_selector("body:not(.idle)")
 
 
 def test_dragging_shows_what_the_library_renders_there(page: Page, server: Running, file: Path) -> None:

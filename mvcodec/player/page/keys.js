@@ -5,9 +5,10 @@ const ARROWS = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], Arrow
 export function keyTable(player) {
   const look = (name) => () => player.toggleLook(name);
   return [
-    { keys: [" "], names: ["Space"], text: "play or pause", run: () => player.togglePlay() },
+    { keys: [" ", "k"], names: ["Space", "k"], text: "play or pause", run: () => player.togglePlay() },
     { keys: [","], text: "one frame back", run: () => player.step(-1) },
     { keys: ["."], text: "one frame on", run: () => player.step(1) },
+    { keys: ["j", "l"], text: "some seconds back, on", run: (event) => player.skip(event.key === "j" ? -1 : 1) },
     { keys: ["Home"], text: "first frame", run: () => player.seek(0) },
     { keys: ["End"], text: "last frame", run: () => player.seek(Infinity) },
     {
@@ -21,7 +22,7 @@ export function keyTable(player) {
     { keys: ["-", "+"], text: "slower, faster", run: (event) => player.changeSpeed(event.key === "-" ? -1 : 1) },
     { keys: ["v"], text: "plain picture", run: look("picture") },
     { keys: ["d"], text: "disparity", run: look("disparity") },
-    { keys: ["l"], text: "depth layers", run: look("layers") },
+    { keys: ["y"], text: "depth layers", run: look("layers") },
     { keys: ["p"], text: "provenance: seen by how many cameras", run: look("provenance") },
     { keys: ["x"], text: "difference from the nearest real view", run: look("difference") },
     { keys: ["m"], text: "PSNR and SSIM against the original", run: () => player.toggleMeasure() },
@@ -30,6 +31,7 @@ export function keyTable(player) {
     { keys: ["n"], text: "nine views", run: look("mosaic") },
     { keys: ["[", "]"], text: "eyes nearer, farther apart", run: (event) => player.changeEyes(event.key === "[" ? -1 : 1) },
     { keys: ["f"], early: true, text: "full screen", run: () => player.toggleFullscreen() },
+    { keys: ["i"], early: true, text: "statistics", run: () => player.toggleStatistics() },
     { keys: ["h"], early: true, text: "hide the controls", run: () => player.toggleControls() },
     { keys: ["?"], early: true, text: "these keys", run: () => player.toggleHelp() },
   ];

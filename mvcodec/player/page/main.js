@@ -13,6 +13,8 @@ const EYES_STEP = 0.05;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const NOTICE_MS = 10000;
 const IDLE_MS = 3000;
+const HINT_MS = 4000;
+const SKIP_S = 5;
 
 const LOOKS = {
   picture: "picture",
@@ -27,6 +29,11 @@ const LOOKS = {
 const STEREO = ["anaglyph", "side-by-side", "mosaic"];
 
 const $ = (id) => document.getElementById(id);
+// 0:07.3
+const clock = (seconds) => {
+  const tenths = Math.round(10 * Math.max(seconds, 0));
+  return `${Math.floor(tenths / 600)}:${String(Math.floor(tenths / 10) % 60).padStart(2, "0")}.${tenths % 10}`;
+};
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 class Player {
@@ -41,8 +48,10 @@ class Player {
     this.stats = new Stats($("stats"));
     this.map = new ArrayMap($("map"), (row, col) => this.moveTo(row, col));
     this.stage = new Stage($("stage"), {
+      touched: () => this.touched(),
       moved: (rows, cols) => this.drag(rows, cols),
-      turned: (frames) => this.turn(frames),
+      clicked: () => this.togglePlay(),
+      doubleClicked: () => this.toggleFullscreen(),
     });
     this.drawing = Promise.resolve();
     this.connection = new Connection(this);
@@ -151,12 +160,17 @@ class Player {
   }
 
   step(frames) {
+    if (this.playback.playing) this.send("play", { playing: false });
     this.send("step", { frames });
   }
 
-  turn(frames) {
-    if (this.playback.playing) this.send("play", { playing: false });
-    this.step(frames);
+  // By some seconds, or a tenth of a short file.
+  skip(direction) {
+    const { facts, shown } = this;
+    if (!facts || !shown) return;
+    const duration = facts.last_s - facts.first_s;
+    const seconds = Math.min(SKIP_S, Math.max(duration / 10, 0.1));
+    this.seek(shown.frame + direction * Math.max(Math.round((seconds * (facts.frames - 1)) / Math.max(duration, 0.001)), 1));
   }
 
   seek(frame) {
@@ -214,6 +228,10 @@ class Player {
     else document.documentElement.requestFullscreen().catch(() => this.warn("This browser refuses full screen"));
   }
 
+  toggleStatistics() {
+    $("stats").hidden = !$("stats").hidden;
+  }
+
   toggleControls() {
     document.body.classList.toggle("bare");
   }
@@ -257,6 +275,7 @@ class Player {
   showPlayback() {
     const { playing, speed, loop } = this.playback;
     this.stir();
+    if (playing) $("big").hidden = true;
     const button = $("play");
     button.setAttribute("aria-pressed", playing);
     button.setAttribute("aria-label", playing ? "Pause" : "Play");
@@ -268,12 +287,11 @@ class Player {
   showFacts() {
     const { facts, shown, wanted } = this;
     wanted.frame = shown.frame;
-    const other = shown.index !== shown.frame && !shown.damage ? ` (${shown.index} of the input)` : "";
-    $("frame").textContent = `frame ${shown.frame} of ${facts.frames - 1}${other}`;
-    $("time").textContent = `${shown.time_s.toFixed(3)} s`;
-    $("viewpoint").textContent = `view ${shown.row.toFixed(2)}, ${shown.col.toFixed(2)}`;
+    if (!$("wait").hidden) this.firstShown();
+    const time = `${clock(shown.time_s - facts.first_s)} / ${clock(facts.last_s - facts.first_s)}`;
+    $("time").textContent = time;
     if (!this.scrubbing) $("timeline").value = shown.frame;
-    $("timeline").setAttribute("aria-valuetext", `frame ${shown.frame}, ${shown.time_s.toFixed(3)} seconds`);
+    $("timeline").setAttribute("aria-valuetext", time);
     this.map.show(shown, wanted);
     drawLegend($("legend"), shown.legend);
     this.showQuality(shown.quality);
@@ -281,6 +299,20 @@ class Player {
     this.link.write({ ...shown, eyes: wanted.eyes }, STEREO.includes(shown.look));
     const { look, frame, row, col, scale, quick } = shown;
     Object.assign(document.body.dataset, { look, frame, row, col, scale, quick });
+  }
+
+  firstShown() {
+    $("wait").hidden = true;
+    $("big").hidden = this.facts.frames < 2 || this.playback.playing;
+    if (this.isTouched || this.facts.rows * this.facts.cols < 2) return;
+    $("hint").hidden = false;
+    setTimeout(() => ($("hint").hidden = true), HINT_MS);
+  }
+
+  // Somebody takes over: no more hint.
+  touched() {
+    this.isTouched = true;
+    $("hint").hidden = true;
   }
 
   showQuality(quality) {
@@ -308,7 +340,7 @@ class Player {
   stir() {
     document.body.classList.remove("idle");
     clearTimeout(this.idling);
-    this.idling = setTimeout(() => document.body.classList.toggle("idle", this.playback.playing), IDLE_MS);
+    this.idling = setTimeout(() => document.body.classList.add("idle"), IDLE_MS);
   }
 
   say(text) {
@@ -318,6 +350,7 @@ class Player {
   wire() {
     const click = (id, action) => $(id).addEventListener("click", action);
     click("play", () => this.togglePlay());
+    click("big", () => this.togglePlay());
     click("back", () => this.step(-1));
     click("on", () => this.step(1));
     click("loop", () => this.toggleLoop());
@@ -327,7 +360,10 @@ class Player {
     click("notice-close", () => ($("notice").hidden = true));
     // After the mouse, the keys belong to the picture again; whoever came by Tab stays there.
     for (const button of document.querySelectorAll("main button")) {
-      button.addEventListener("click", (event) => event.detail && $("stage").focus());
+      button.addEventListener("click", (event) => {
+        this.touched();
+        if (event.detail) $("stage").focus();
+      });
     }
     $("speed").addEventListener("change", () => this.setSpeed(Number($("speed").value)));
     $("look").addEventListener("change", () => this.setLook($("look").value));

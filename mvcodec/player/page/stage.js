@@ -1,19 +1,24 @@
-// The picture: draws it, and turns dragging and the wheel into moves.
+// The picture: draws it, and turns dragging into moves.
 
-const WHEEL_PX = 60; // of a wheel's notch, or of a finger's way on a touchpad
+const STILL_PX = 5; // a pointer that moved less was not dragged
+const DOUBLE_MS = 280;
 
 export class Stage {
-  // `moved(rows, cols)`: by how many spans of the array; `turned(frames)`: by the wheel.
-  constructor(element, { moved, turned }) {
+  // `moved(rows, cols)`: by how many spans of the array; `clicked` comes after it is known to be no double click.
+  constructor(element, { touched, moved, clicked, doubleClicked }) {
     this.element = element;
     this.canvas = element.querySelector("canvas");
     this.context = this.canvas.getContext("2d", { alpha: false });
     this.last = null;
-    this.wheel = 0;
-    element.addEventListener("pointerdown", (event) => this.grab(event));
+    this.start = null;
+    this.click = null;
+    element.addEventListener("pointerdown", (event) => {
+      touched();
+      this.grab(event);
+    });
     element.addEventListener("pointermove", (event) => this.drag(event, moved));
-    for (const end of ["pointerup", "pointercancel"]) element.addEventListener(end, (event) => this.release(event));
-    element.addEventListener("wheel", (event) => this.turn(event, turned), { passive: false });
+    element.addEventListener("pointerup", (event) => this.release(event) && this.count(clicked, doubleClicked));
+    element.addEventListener("pointercancel", (event) => this.release(event));
   }
 
   async draw(blob) {
@@ -30,6 +35,8 @@ export class Stage {
   grab(event) {
     if (event.button !== 0 || this.last) return;
     this.last = { id: event.pointerId, x: event.clientX, y: event.clientY };
+    this.start = this.last;
+    this.dragged = false;
     this.element.setPointerCapture(event.pointerId);
     this.element.classList.add("dragging");
   }
@@ -37,28 +44,33 @@ export class Stage {
   drag(event, moved) {
     const last = this.last;
     if (!last || event.pointerId !== last.id) return;
+    this.dragged ||= Math.hypot(event.clientX - this.start.x, event.clientY - this.start.y) > STILL_PX;
+    if (!this.dragged) return;
     const { width, height } = this.shown();
     // The scene follows the finger: the viewpoint goes the other way.
     moved((last.y - event.clientY) / height, (last.x - event.clientX) / width);
-    last.x = event.clientX;
-    last.y = event.clientY;
+    this.last = { id: last.id, x: event.clientX, y: event.clientY };
   }
 
+  // True where the pointer was not dragged.
   release(event) {
-    if (!this.last || event.pointerId !== this.last.id) return;
+    if (!this.last || event.pointerId !== this.last.id) return false;
     this.last = null;
     this.element.classList.remove("dragging");
+    return !this.dragged;
   }
 
-  turn(event, turned) {
-    if (event.ctrlKey) return; // the browser's zoom
-    event.preventDefault();
-    const px = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : event.deltaY * WHEEL_PX;
-    if (Math.sign(px) !== Math.sign(this.wheel)) this.wheel = 0;
-    this.wheel += px;
-    const frames = Math.trunc(this.wheel / WHEEL_PX);
-    this.wheel -= frames * WHEEL_PX;
-    if (frames) turned(frames);
+  count(clicked, doubleClicked) {
+    if (this.click !== null) {
+      clearTimeout(this.click);
+      this.click = null;
+      doubleClicked();
+      return;
+    }
+    this.click = setTimeout(() => {
+      this.click = null;
+      clicked();
+    }, DOUBLE_MS);
   }
 
   // The size of the picture in the window, px.

@@ -1,4 +1,4 @@
-// What playing costs: pictures drawn in the last second, and the milliseconds of the last pictures.
+// For those who want to know: which picture it is, pictures drawn in the last second, and what the last ones cost.
 
 const WINDOW_MS = 1000;
 const LAST = 8;
@@ -37,7 +37,12 @@ export class Stats {
       const values = this.recent.map((facts) => facts[name]).filter((value) => typeof value === "number");
       return padded(values.length ? String(Math.round(values.reduce((sum, value) => sum + value, 0) / values.length)) : "–");
     };
+    const { frame, index, time_s, row, col, damage } = this.facts;
+    const other = index !== frame && !damage ? `, ${index} of the input` : "";
     const parts = [
+      `frame ${frame} (from 0)${other}`,
+      `${time_s.toFixed(3)} s`,
+      `view ${row.toFixed(2)}, ${col.toFixed(2)}`,
       `${padded(String(this.fps || "–"))} fps`,
       `decode ${ms("decode_ms")} ms`,
       `synthesis ${ms("synthesis_ms")} ms`,
