@@ -87,7 +87,7 @@ def test_keys_step_look_and_change_what_is_shown(page: Page) -> None:
 
 
 def test_space_plays_and_the_time_runs_and_loops(page: Page) -> None:
-    expect(page.locator(".time")).to_have_text("0:00.2 / 0:00.5")
+    expect(page.locator(".time")).to_have_text("0:00.2 / 0:00.6")
     page.keyboard.press(" ")
     waits_for(page, "shown.isPlaying")
     waits_for(page, "shown.frame === 5")

@@ -45,7 +45,7 @@ def linked_page(title: str, source: str, poster: str | None) -> str:
     Args:
         source, poster: names of the files beside it; without a poster the first picture is waited for.
     """
-    policy = content_policy("'self'", "'self'", "* blob: data:")
+    policy = content_policy("'self'", "'self'", "* ws: wss: blob: data:")
     return _filled(title, policy, _element(src=source, poster=poster))
 
 
@@ -58,7 +58,7 @@ def single_page(title: str, recording: bytes | str, poster: str | None = None) -
     """
     page = page_files()
     script, style = page["player.js"].decode(), page["page.css"].decode()
-    policy = content_policy(f"'{_digest(script)}'", f"'{_digest(style)}'", "* blob: data:")
+    policy = content_policy(f"'{_digest(script)}'", f"'{_digest(style)}'", "* ws: wss: blob: data:")
     source = recording if isinstance(recording, str) else None
     text = _filled(title, policy, _element(src=source, poster=poster))
     embedded = ""

@@ -31,7 +31,7 @@ const STEREO = ["anaglyph", "side-by-side", "mosaic"];
 const $ = (id) => document.getElementById(id);
 // 0:07.3
 const clock = (seconds) => {
-  const tenths = Math.round(10 * Math.max(seconds, 0));
+  const tenths = Math.floor(10 * Math.max(seconds, 0) + 0.001);
   return `${Math.floor(tenths / 600)}:${String(Math.floor(tenths / 10) % 60).padStart(2, "0")}.${tenths % 10}`;
 };
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
@@ -288,7 +288,8 @@ class Player {
     const { facts, shown, wanted } = this;
     wanted.frame = shown.frame;
     if (!$("wait").hidden) this.firstShown();
-    const time = `${clock(shown.time_s - facts.first_s)} / ${clock(facts.last_s - facts.first_s)}`;
+    // The last frame is shown until the end.
+    const time = `${clock(shown.time_s - facts.first_s)} / ${clock(facts.last_s - facts.first_s + 1 / facts.fps)}`;
     $("time").textContent = time;
     if (!this.scrubbing) $("timeline").value = shown.frame;
     $("timeline").setAttribute("aria-valuetext", time);

@@ -31,7 +31,9 @@ export interface Actions {
 export interface ControlState {
   readonly isPlaying: boolean;
   readonly seconds: number;
+  /** Of the last frame; it is shown until `end`. */
   readonly duration: number;
+  readonly end: number;
   readonly speed: number;
   readonly look: Look;
   readonly eyes: Eyes["mode"];
@@ -88,7 +90,7 @@ export class Controls {
       this.#play.replaceChildren(icon(state.isPlaying ? "pause" : "play"));
     }
     this.#duration = state.duration;
-    const text = `${timeText(state.seconds)} / ${timeText(state.duration)}`;
+    const text = `${timeText(state.seconds)} / ${timeText(state.end)}`;
     this.#time.textContent = state.isGrowing ? `${text} ${TEXTS.live}` : text;
     this.#timeline.max = String(Math.round(state.duration * STEPS_PER_SECOND));
     this.#timeline.value = String(Math.round(state.seconds * STEPS_PER_SECOND));

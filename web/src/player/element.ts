@@ -1,5 +1,6 @@
 /** `<mvcodec-player src view autoplay>`: the player as a custom element; the page is one with `page`. */
 
+import { isLiveAddress } from "../container/live.ts";
 import { BlobSource, HttpSource, type Source } from "../container/sources.ts";
 import type { Viewpoint } from "../geometry.ts";
 import type { Look, Pixels } from "../synthesis/renderer.ts";
@@ -165,7 +166,8 @@ export class MvcodecPlayer extends HTMLElement {
   async #start(engine: Engine, from: string | Blob, at: { seconds?: number; view?: Viewpoint | undefined }): Promise<void> {
     try {
       if (!("VideoDecoder" in globalThis)) throw new Error(TEXTS.noWebCodecs);
-      const source: Source = typeof from === "string" ? await HttpSource.open(from) : new BlobSource(from);
+      const source: Source | string =
+        typeof from !== "string" ? new BlobSource(from) : isLiveAddress(from) ? from : await HttpSource.open(from);
       await engine.open(source, at);
     } catch (error) {
       if (engine === this.#engine) this.#tell({ message: (error as Error).message, isFatal: true });

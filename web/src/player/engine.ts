@@ -2,6 +2,7 @@
 
 import type { Header } from "../container/header.ts";
 import { topicOf } from "../container/messages.ts";
+import { LiveRecording } from "../container/live.ts";
 import { openRecording } from "../container/open.ts";
 import { frameAt, frameCount, keySpanAt, timeOf, type Recording } from "../container/recording.ts";
 import type { Source } from "../container/sources.ts";
@@ -59,6 +60,8 @@ export class Engine {
   /** How long the last frame took to decode. */
   decodeMs = 0;
   #isFetching = false;
+  /** The newest frame of a live view. */
+  #liveFrame: number | undefined;
   #isDirty = false;
   /** What is on the screen has all detail; what is drawn next is to have it. */
   #isFinal = false;
@@ -76,15 +79,16 @@ export class Engine {
     canvas.addEventListener("webglcontextrestored", () => this.#restore());
   }
 
-  /** Read a file and show it from some seconds on; the view is the array's middle unless one is given. Throws Error. */
-  async open(source: Source, at: { seconds?: number; view?: Viewpoint | undefined } = {}): Promise<void> {
-    const recording = await openRecording(source, {
-      fromSeconds: at.seconds ?? 0,
-      tell: (text) => this.#events.onTrouble(text, false),
-      onGrowth: () => this.#grown(),
-    });
+  /** Read a file, or follow the live view at an address, and show it from some seconds on; the view is the array's middle unless one is given. Throws Error. */
+  async open(source: Source | string, at: { seconds?: number; view?: Viewpoint | undefined } = {}): Promise<void> {
+    const tell = (text: string) => this.#events.onTrouble(text, false);
+    const onGrowth = () => this.#grown();
+    const recording = typeof source === "string"
+      ? await LiveRecording.open(source, tell, onGrowth)
+      : await openRecording(source, { fromSeconds: at.seconds ?? 0, tell, onGrowth });
     if (this.isClosed) return recording.close();
-    this.#source = source;
+    if (typeof source === "string") this.#liveFrame = 0;
+    else this.#source = source;
     this.#recording = recording;
     this.#store = new FrameStore(recording, (text) => this.#events.onTrouble(text, false));
     const { header } = recording;
@@ -340,6 +344,11 @@ export class Engine {
   }
 
   #grown(): void {
+    if (this.#liveFrame !== undefined) {
+      // Whoever is at the newest picture stays there.
+      if (this.shown.frame === this.#liveFrame) this.shown.frame = this.count - 1;
+      this.#liveFrame = this.count - 1;
+    }
     this.playback.setEnd(this.timeOf(this.count - 1) + 1 / this.header.fps);
     this.#events.onState();
     this.wake();

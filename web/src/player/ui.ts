@@ -140,6 +140,7 @@ export class Ui {
       isPlaying: playback.isPlaying,
       seconds: engine.timeOf(engine.frame),
       duration: engine.timeOf(engine.count - 1),
+      end: engine.timeOf(engine.count - 1) + 1 / engine.header.fps,
       speed: playback.speed,
       look: shown.look,
       eyes: shown.eyes.mode,
