@@ -128,6 +128,20 @@ def test_too_little_texture_is_said(level: int, noise: float, grid: tuple[int, i
         assert estimate_range(array, frames, (-3.0, 7.0)) == (-3.0, 7.0)
 
 
+def test_what_keeps_pictures_from_matching_is_named() -> None:
+    array = linear_or_grid(1, 2, 320, 200, name="rig")
+    draw = np.random.default_rng(6)
+    noise = {at: draw.integers(0, 255, (200, 320, 3), np.uint8) for at in array.real}
+    others: dict[Position, Picture] = {
+        at: np.asarray(cv2.GaussianBlur(picture, (0, 0), 1.5), np.uint8) for at, picture in noise.items()
+    }
+    dark: dict[Position, Picture] = {at: np.zeros((200, 320, 3), np.uint8) for at in array.real}
+    with pytest.warns(MvCodecWarning, match="rig: the cameras' pictures don't match; .* rectified"):
+        estimate_range(array, [FrameSet(0, 0, others)])
+    with pytest.warns(MvCodecWarning, match="rig: too little texture to match in pictures so dark"):
+        estimate_range(array, [FrameSet(0, 0, dark)])
+
+
 @pytest.mark.parametrize("size", [(8, 6), (1, 1), (50, 1), (1, 50)], ids=str)
 def test_survives_tiny_pictures(size: tuple[int, int]) -> None:
     array = linear_or_grid(2, 2, *size)

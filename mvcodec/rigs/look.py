@@ -131,9 +131,7 @@ def _equal(cameras: tuple[Position, ...], pictures: Mapping[Position, Picture]) 
 
 def _found(cameras: tuple[Position, ...], pictures: Mapping[Position, Picture]) -> _Seen:
     height, width = pictures[cameras[0]].shape[:2]
-    scale = min(
-        1.0, float(np.sqrt(_PIXELS * max(1, min(len(cameras) / 8, 2)) / (height * width * len(cameras))))
-    )
+    scale = min(1.0, float(np.sqrt(_PIXELS / (height * width * len(cameras)))))
     most = max(220, _FEATURES * 4 // max(len(cameras), 4))
 
     def features(at: Position) -> Features:

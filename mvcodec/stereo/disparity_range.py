@@ -36,6 +36,9 @@ _BORDER_SHARE = 1 / 64
 _WINDOW = 5
 _MIN_CONTRAST = 2.5
 _MIN_CORRELATION = 0.7
+_TEXTURED_SHARE = 0.1
+"""Of a picture that has contrast: less is too little to match by."""
+_DARK_LEVEL = 12.0
 _MIN_PATCH_PX = 20
 _MAX_GAP_BINS = 2
 # A small near object matters more than a small far one: it hides what is behind it. So less
@@ -82,8 +85,8 @@ def estimate_range(
         hint_px: (lo, hi) between neighbouring real cameras that the result stays inside.
 
     Returns:
-        (lo, hi), px, lo < hi; lo may be negative. With too little texture to match a
-        MvCodecWarning is issued and the hint, or else 0..16, is returned.
+        (lo, hi), px, lo < hi; lo may be negative. Where next to nothing matches, a MvCodecWarning
+        names the cause, and the hint, or else 0..16, is returned.
 
     Raises:
         SettingError: no frame set, or a hint with lo >= hi.
@@ -101,7 +104,7 @@ def estimate_range(
     if coarse is None or share < MIN_MATCHED_SHARE:
         fallback = hint_px or coarse or FALLBACK_RANGE_PX
         warnings.warn(
-            f"{array.name or 'input'}: too little texture to match ({share:.1%} of the pixels found"
+            f"{array.name or 'input'}: {_reason(jobs)} ({share:.1%} of the pixels found"
             f" a partner); disparity range set to {fallback[0]:g}..{fallback[1]:g} px",
             MvCodecWarning,
             stacklevel=2,
@@ -117,6 +120,21 @@ def estimate_range(
     low -= _LEAST_MARGIN_PX + _FAR_MARGIN * extent
     high += _LEAST_MARGIN_PX + _NEAR_MARGIN * extent
     return _inside((float(math.floor(low)), float(math.ceil(high))), hint_px)
+
+
+def _reason(jobs: Sequence[_Job]) -> str:
+    """Why pictures don't match: what contrast they have, and how bright they are."""
+    pictures = [_shrunk(picture, COARSE_WIDTH) for job in jobs for picture in (job.left, job.right)]
+    levels = [cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY).astype(np.float32) for picture in pictures]
+    textured = [float(np.mean(_variance(grey) > _MIN_CONTRAST**2)) for grey in levels]
+    if min(textured) >= _TEXTURED_SHARE:
+        return (
+            "the cameras' pictures don't match; are they of one moment, in the order of the grid, and"
+            " rectified (`mvcodec rectify`)?"
+        )
+    if float(np.median([grey.mean() for grey in levels])) < _DARK_LEVEL:
+        return "too little texture to match in pictures so dark"
+    return "too little texture to match"
 
 
 def _inside(range_px: tuple[float, float], hint_px: tuple[float, float] | None) -> tuple[float, float]:
@@ -229,16 +247,22 @@ def _not_repeated(values: FloatMap, sure: Mask, unique: Mask) -> Mask:
     return kept
 
 
+def _mean(pixels: FloatMap) -> FloatMap:
+    """Of each pixel's window."""
+    return np.asarray(cv2.blur(pixels, (_WINDOW, _WINDOW)), np.float32)
+
+
+def _variance(pixels: FloatMap) -> FloatMap:
+    """Of each pixel's window."""
+    mean = _mean(pixels)
+    return np.asarray(_mean(pixels * pixels) - mean * mean, np.float32)
+
+
 def _alike(first: FloatMap, second: FloatMap) -> Mask:
     """Where windows of two pictures have contrast and correlate (NCC, equation 3.6)."""
 
-    def mean(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
-        return np.asarray(cv2.blur(pixels, (_WINDOW, _WINDOW)), np.float32)
-
-    mean_a, mean_b = mean(first), mean(second)
-    variance_a = mean(first * first) - mean_a * mean_a
-    variance_b = mean(second * second) - mean_b * mean_b
-    covariance = mean(first * second) - mean_a * mean_b
+    variance_a, variance_b = _variance(first), _variance(second)
+    covariance = _mean(first * second) - _mean(first) * _mean(second)
     contrast = np.minimum(variance_a, variance_b) > _MIN_CONTRAST**2
     correlated = covariance > _MIN_CORRELATION * np.sqrt(np.maximum(variance_a * variance_b, 0))
     return np.asarray(contrast & correlated)
