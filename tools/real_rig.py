@@ -1,4 +1,4 @@
-"""Measures `rectify` on a real rig whose calibration is known: by its files, by the scene, and their depth."""
+"""Measures `rectify` on a real rig of known calibration: by its files, by the scene, and their depth."""
 
 from __future__ import annotations
 
