@@ -27,13 +27,15 @@ ARGUMENTS = (
     "--disable-sync",
 )
 SCREENSHOTS = Path(__file__).parents[1] / "build" / "screenshots"
+FIRST_PICTURE_MS = 240_000
+"""Kernels may have to be compiled first, on a machine that does much else."""
 SAME_DB = 33
 """A picture that came as JPEG has more than this against its own source."""
 
 
 def show(page: Page, server: Running, link: str = "") -> None:
     page.goto(server.url + link)
-    page.wait_for_selector("body[data-frame]")
+    page.wait_for_selector("body[data-frame]", timeout=FIRST_PICTURE_MS)
 
 
 def shows(page: Page, **facts: object) -> None:

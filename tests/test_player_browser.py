@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from browser_page import (
     CHROMIUM,
+    FIRST_PICTURE_MS,
     NO_CHROMIUM,
     SAME_DB,
     box_of,
@@ -103,7 +104,7 @@ def test_plays_loops_and_pauses(page: Page, server: Running) -> None:
 
 def test_it_says_how_to_look_around_and_a_click_plays(page: Page, server: Running) -> None:
     page.goto(server.url)
-    page.wait_for_selector("#hint:has-text('Drag to look around')")
+    page.wait_for_selector("#hint:has-text('Drag to look around')", timeout=FIRST_PICTURE_MS)
     page.wait_for_selector("#big")
     assert page.is_hidden("#wait")
     page.mouse.click(640, 200)

@@ -70,8 +70,8 @@ def find_views(folder: Path, grid: tuple[int, int] | None = None) -> FoundViews:
 
 def _listed(folder: Path) -> tuple[list[str], bool]:
     if not folder.is_dir():
-        found = "a file" if folder.exists() else "nothing there"
-        raise InputError(folder, found, "a folder of pictures or videos")
+        is_there = folder.exists()
+        raise InputError(folder, "a file" if is_there else "nothing there", "a folder of pictures or videos")
     try:
         paths = [path for pattern in ("*", "*/*") for path in folder.glob(pattern) if path.is_file()]
     except OSError as error:
