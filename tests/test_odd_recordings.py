@@ -184,6 +184,20 @@ def test_parameter_sets_may_come_by_themselves() -> None:
     assert Read(written(messages)).pairs == list(range(12))
 
 
+def test_video_without_start_codes_is_told() -> None:
+    """Length prefixes in place of start codes, as MP4 has them."""
+    messages = [
+        (t, CompressedVideo(data=m.data.replace(b"\0\0\1", b"\0\0\2"), format="h264"), log, stamp)
+        for t, m, log, stamp in videos(4)
+    ]
+    data = io.BytesIO(written(messages))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        with pytest.raises(InputError, match="no frame set of all cameras"):
+            Recording(data, "rec", RecordingSettings((TOPICS,)))
+    assert any("it has no start codes" in str(warning.message) for warning in caught)
+
+
 @pytest.mark.parametrize("compression", [CompressionType.LZ4, CompressionType.NONE])
 def test_packings(compression: CompressionType) -> None:
     assert Read(written(raws(range(4)), compression)).pairs == list(range(4))

@@ -6,9 +6,11 @@ import warnings
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
+from typing import cast
 
 import av
 import pytest
+from av.video.stream import VideoStream
 from timed_videos import SIZE, number_of, numbered, write_video
 
 from mvcodec.capture import open_input
@@ -133,3 +135,17 @@ def test_a_rate_is_that_of_all_usual_steps() -> None:
     assert rate_of_times(milliseconds) == 30.0
     assert rate_of_times([time + (60 * 10**9 if time > 5e8 else 0) for time in milliseconds]) == 30.0
     assert rate_of_times([5]) is None
+
+
+@pytest.mark.parametrize(("codec", "unsure"), [("libvpx", True), ("libx264", False)])
+def test_gaps_of_codecs_that_do_not_tell_losses_are_told(codec: str, unsure: bool, tmp_path: Path) -> None:
+    with av.open(str(tmp_path / "a.mkv"), "w") as out:
+        stream = cast("VideoStream", out.add_stream(codec, rate=30, options={"g": "10"}))
+        stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p"
+        for number in (*range(5), *range(6, 12)):
+            frame = av.VideoFrame.from_ndarray(numbered(number), format="rgb24")
+            frame.pts = number
+            out.mux(stream.encode(frame))
+        out.mux(stream.encode())
+    told = sets(tmp_path / "a.mkv")[2]
+    assert any("1 gaps in time" in text for text in told) == unsure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -56,9 +57,12 @@ def test_a_constant_rate_is_exact(tmp_path: Path, fps: float) -> None:
 
 
 def test_a_pause_that_mp4_cannot_say_is_shortened(tmp_path: Path) -> None:
-    with Mp4Writer(tmp_path / "v.mp4", 24, 16, 25.0) as writer:
-        for time_ns in (0, 40_000_000, 30 * 86_400 * 10**9):
-            writer.push(PICTURE, time_ns)
+    with warnings.catch_warnings(record=True) as told, Mp4Writer(tmp_path / "v.mp4", 24, 16, 25.0) as writer:
+        warnings.simplefilter("always")
+        for days in (0, 30, 60):
+            writer.push(PICTURE, days * 86_400 * 10**9)
+            writer.push(PICTURE, days * 86_400 * 10**9 + 40_000_000)
+    assert ["v.mp4: pauses of more than" in str(warning.message) for warning in told] == [True]
     times = VideoView(tmp_path / "v.mp4").times_ns
     assert times is not None
     assert times[1] == 40_000_000

@@ -109,7 +109,7 @@ class Recording:
             filter(None, map(typical_step_ns, self._reader.log_times.values())), default=None
         )
         self._last_ns: int | None = None
-        self._dropped = self._told = self._repeated = 0
+        self._dropped = self._told = self._repeated = self._count = 0
         self._apart = dict.fromkeys(self._queues, (0, 0))
         self._checked_apart = False
         self._frames: dict[Position, str] = {}
@@ -148,6 +148,7 @@ class Recording:
                         label, size, f"{array.width}x{array.height} px as in the first frame set"
                     )
                 pictures[row, col] = np.asarray(values, np.uint8)
+            self._count = index + 1
             yield FrameSet(index, time_ns, pictures, given)
         self._tell_end()
 
@@ -162,7 +163,7 @@ class Recording:
             self._warn(f"cut off after {self._last_ns / 1e9:.3f} s")
         if self._dropped > _TOLD:
             self._warn(f"{self._dropped} pictures were dropped in all")
-        if self._repeated > _TOLD and 2 * self._repeated > self._dropped and self._settings.clock == "stamp":
+        if self._repeated > _TOLD * self._count and self._settings.clock == "stamp":
             self._warn("most of them have stamps that stand still; `clock` log takes when they were written")
         step = self._step_ns()
         for position, (low, high) in self._apart.items():

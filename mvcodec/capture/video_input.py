@@ -85,6 +85,11 @@ class VideoView:
         self.size = self._orientation.size(*self._coded_size)
         self.notes += notes + unusual(first)
         self.notes += tuple(f"{count} pictures are left out: {why}" for why, count in times.left_out.items())
+        if times.unsure:
+            self.notes += (
+                f"{times.unsure} gaps in time: video of its codec does not say whether pictures are missing"
+                " there that later ones build on",
+            )
         if times.cut_off:
             self.notes += (f"it breaks off after {self.count} pictures ({times.cut_off})",)
 

@@ -25,6 +25,8 @@ _CODECS = {"h264": "h264", "h265": "hevc", "hevc": "hevc", "vp9": "vp9", "av1": 
 
 _LIBRARIES = {"h264": "h264", "hevc": "hevc", "vp9": "vp9", "av1": "libdav1d"}
 
+_NAL_CODECS, _START_CODE = ("h264", "hevc"), b"\0\0\1"
+
 _RECENT = 4
 """Messages among which a repeated one is looked for."""
 
@@ -78,6 +80,8 @@ class VideoDecoder:
         data = self._head + message.data
         why, unit = self._whole.push(data, message.time_ns)
         if unit is not None and not unit.pictures:
+            if codec in _NAL_CODECS and _START_CODE not in data:
+                raise LeftOut("it has no start codes, as video in Annex B form has")
             self._head = data[:_MAX_HEAD_BYTES]
             return []
         self._head = b""

@@ -31,6 +31,11 @@ _UNKNOWN_TIME = "how many pictures are missing before them is unknown, since the
 
 _MS = 1_000_000
 
+_TELL_LOSSES = ("h264", "hevc", "libdav1d", "av1")
+"""Codecs whose pictures say when what they build on is missing."""
+
+_GAP_STEPS = 1.5
+
 _ANNEX_B = {"h264": "h264_mp4toannexb", "hevc": "hevc_mp4toannexb"}
 
 
@@ -47,6 +52,7 @@ class VideoTimes:
         fps: pictures a second; 0 where nothing says so.
         left_out: how many pictures are left out, by the reason.
         cut_off: why the file could not be read to its end; empty where it could.
+        unsure: gaps behind which pictures may build on missing ones, since their codec does not tell.
     """
 
     stamps: tuple[int, ...]
@@ -57,6 +63,7 @@ class VideoTimes:
     fps: float
     left_out: Mapping[str, int]
     cut_off: str = ""
+    unsure: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +104,18 @@ def read_times(container: InputContainer, stream: VideoStream) -> VideoTimes:
     if len(stamps) < len(whole):
         left_out[_SAME_TIME] = len(whole) - len(stamps)
     times, fps = _times(stamps, stream)
-    return VideoTimes(tuple(stamps), False, False, times, 0, fps, left_out, cut_off)
+    unsure = 0 if stream.codec_context.name in _TELL_LOSSES else _gaps(whole)
+    return VideoTimes(tuple(stamps), False, False, times, 0, fps, left_out, cut_off, unsure)
+
+
+def _gaps(packets: Sequence[_Packet]) -> int:
+    """How often the time from a picture to the next is longer than usual, and that one is no keyframe."""
+    times = [packet.pts or 0 for packet in packets]
+    usual = typical_step_ns(times)
+    return sum(
+        after - before > _GAP_STEPS * usual and not packet.keyframe
+        for before, after, packet in zip(times, times[1:], packets[1:], strict=False)
+    )
 
 
 def _times(ticks: Sequence[int], stream: VideoStream) -> tuple[tuple[int, ...], float]:

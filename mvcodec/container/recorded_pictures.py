@@ -130,7 +130,7 @@ class RecordingReader:
                     f"the clock that {topic} was written down by was set back: its messages are taken in the"
                     " order of the file"
                 )
-            self._times[topic] = sorted(written)
+            self._times[topic] = sorted(set(written))
         self._by_time = not self.notes
         if self._by_time:
             self._parts.sort(key=lambda part: part.start_ns)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from contextlib import ExitStack
 from fractions import Fraction
 from pathlib import Path
@@ -23,7 +24,7 @@ from av.video.reformatter import (
 )
 from av.video.stream import VideoStream
 
-from mvcodec.errors import OutputError, StreamClosed
+from mvcodec.errors import MvCodecWarning, OutputError, StreamClosed
 from mvcodec.frames import Picture
 from mvcodec.output.atomic import replacing
 
@@ -69,6 +70,7 @@ class Mp4Writer:
         ticks = min(_TICKS, math.ceil(_STEP_TICKS * self._rate))
         self._ticks = self._rate.numerator * math.ceil(ticks / self._rate.numerator)
         self._first_ns = self._last_ticks = 0
+        self._told = False
         self._reformatter, self._count, self._closed = VideoReformatter(), 0, False
         with ExitStack() as stack:
             part = stack.enter_context(replacing(path))
@@ -130,6 +132,13 @@ class Mp4Writer:
         step = round(self._ticks / self._rate)
         if time_ns is not None:
             step = round(Fraction(time_ns - self._first_ns, 10**9) * self._ticks) - self._last_ticks
+        if step > _MAX_STEP_TICKS and not self._told:
+            self._told = True
+            most = _MAX_STEP_TICKS / self._ticks
+            text = (
+                f"{self.path}: pauses of more than {most:.0f} s become that long, the most that MP4 can say"
+            )
+            warnings.warn(text, MvCodecWarning, stacklevel=2)
         self._last_ticks += min(max(step, 1), _MAX_STEP_TICKS)
         return self._last_ticks
 
