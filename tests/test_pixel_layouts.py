@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from mvcodec.capture.bit_depth import BitDepth
-from mvcodec.capture.picture_files import picture_size, read_picture
+from mvcodec.capture.picture_files import look_at_depth, picture_size, read_picture
 from mvcodec.capture.picture_messages import StillDecoder
 from mvcodec.container.recorded_pictures import RecordedPicture
 from mvcodec.errors import InputError
@@ -118,3 +118,21 @@ def _write_deep_tiff(path: Path, picture: Picture, tag: int) -> None:
     data[4:8] = len(data).to_bytes(4, "little")
     data += len(listed).to_bytes(2, "little") + b"".join(listed) + bytes(4)
     path.write_bytes(data)
+
+
+@pytest.mark.parametrize("bits", [10, 12, 16])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_deep_png_files_are_scaled_by_their_depth(bits: int, channels: int, tmp_path: Path) -> None:
+    """Pillow takes the upper 8 bits of deep colours: black, where the lower 10 or 12 are used."""
+    top = (1 << bits) - 1
+    values = np.linspace(0, top, SIZE[0] * SIZE[1] * channels).round().astype(np.uint16)
+    pixels = values.reshape(SIZE[1], SIZE[0], channels)
+    path = tmp_path / "a.png"
+    assert cv2.imwrite(str(path), pixels[..., ::-1])
+    depth = BitDepth("a")
+    look_at_depth(path, depth)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        picture = read_picture(path, depth=depth)
+    assert np.abs(picture - pixels * (255.0 / top)).max() <= 0.51
+    assert len(told) == (bits < 16)

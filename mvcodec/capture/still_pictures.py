@@ -28,6 +28,9 @@ SCALING_DECODERS = ("ppm", "ppm_plain")
 _TURNED_WHEN_READ = ("TIFF",)
 """Pillow and OpenCV turn these by themselves, and no others."""
 
+_BITS, _STRETCHED = "bits in the file", "stretched when read"
+"""What is kept beside an opened picture's own information."""
+
 _ALPHA_MODES = frozenset({"RGBA", "LA", "PA", "La", "RGBa"})
 _SIGNIFICANT_BITS = b"sBIT"
 
@@ -64,6 +67,8 @@ def opened_still(source: Path | bytes) -> Iterator[ImageFile.ImageFile]:
     # Pillow, not OpenCV: equally exact, but OpenCV's libpng writes its own complaints to stderr.
     try:
         with Image.open(io.BytesIO(source) if isinstance(source, bytes) else source) as picture:
+            # Once its pixels are read, Pillow forgets how they lie in the file; the tags of a PNG read them.
+            picture.info |= {_BITS: _bits(picture), _STRETCHED: _is_stretched(picture)}
             yield picture
     except UnidentifiedImageError:
         size = len(source) if isinstance(source, bytes) else source.stat().st_size
@@ -80,7 +85,7 @@ def still_facts(picture: ImageFile.ImageFile) -> StillFacts:
     tag = None if picture.format in _TURNED_WHEN_READ else picture.getexif().get(ExifTags.Base.Orientation)
     orientation = exif_orientation(tag)
     alpha = picture.mode in _ALPHA_MODES or "transparency" in picture.info
-    return StillFacts(orientation.size(*picture.size), orientation, alpha, _bits(picture))
+    return StillFacts(orientation.size(*picture.size), orientation, alpha, picture.info[_BITS])
 
 
 def is_see_through(picture: ImageFile.ImageFile) -> bool:
@@ -104,7 +109,7 @@ def still_to_rgb(picture: ImageFile.ImageFile, source: Path | bytes, depth: BitD
     if facts.bits > 8:
         data = source if isinstance(source, bytes) else source.read_bytes()
         deep = np.array(picture).astype(np.uint16) if picture.mode in GREY_MODES else _deep_colours(data)
-        stated = facts.bits if _is_stretched(picture) else _stated_bits(data)
+        stated = facts.bits if picture.info[_STRETCHED] else _stated_bits(data)
         pixels = _three_channels(depth.scale(deep, stated))
     else:
         pixels = np.array(picture if picture.mode == "RGB" else picture.convert("RGB"), np.uint8)
@@ -114,7 +119,7 @@ def still_to_rgb(picture: ImageFile.ImageFile, source: Path | bytes, depth: BitD
 def deep_pixels(source: bytes) -> DeepPixels | None:
     """The pixels of a picture of 9 to 16 bits whose file does not say how many it uses; None of others."""
     with opened_still(source) as picture:
-        if still_facts(picture).bits != 16 or _is_stretched(picture) or _stated_bits(source) is not None:
+        if picture.info[_BITS] != 16 or picture.info[_STRETCHED] or _stated_bits(source) is not None:
             return None
         if picture.mode in GREY_MODES:
             return np.array(picture).astype(np.uint16)
