@@ -18,7 +18,7 @@ from command_line import COMMAND, fails
 from live_senders import FPS, NUMBERS, Sender, Server, free_port
 from timed_videos import number_of, numbered
 
-from mvcodec.capture.live_address import how_to_open, is_live_address
+from mvcodec.capture.live_address import Opened, how_to_open, is_live_address
 from mvcodec.capture.live_cameras import LiveCameras, LiveSettings
 from mvcodec.capture.live_clock import ArrivalClock, common_clock
 from mvcodec.container import read_info
@@ -161,6 +161,16 @@ def test_the_command_waits_for_what_reads_before_it_ends(tmp_path: Path) -> None
             "0.1",
         )
         assert "found no whole picture for 0.1 s" in line
+
+
+def test_what_ffmpeg_lacks_is_said_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "mvcodec.capture.live_camera.how_to_open", lambda _address: Opened("nonsense://127.0.0.1:1")
+    )
+    with pytest.raises(
+        InputError, match=r"udp://a: found an address that this FFmpeg cannot open \(Protocol"
+    ):
+        LiveCameras(LiveSettings(("udp://a",), (1, 1), patience_s=600))
 
 
 def test_addresses_are_told_from_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from typing import cast
 import av
 from av.codec import Codec
 from av.container import InputContainer
-from av.error import FFmpegError
+from av.error import DemuxerNotFoundError, FFmpegError, ProtocolNotFoundError
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
@@ -65,6 +65,7 @@ class LiveCamera:
         connection: counts how often it was opened.
         left_out: pictures that were not whole, or waited for too long.
         problem: why it cannot be read now; empty where it can.
+        hopeless: FFmpeg has not got what its address needs: no further try will help.
     """
 
     def __init__(self, address: str, changed: threading.Condition, patience_s: float = _OPEN_S) -> None:
@@ -73,6 +74,7 @@ class LiveCamera:
         self.clock = ArrivalClock()
         self.connection = self.left_out = 0
         self.problem = ""
+        self.hopeless = False
         self._changed, self._stop = changed, threading.Event()
         self._timeout_s = min(_OPEN_S, patience_s), min(_READ_S, patience_s)
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -102,6 +104,10 @@ class LiveCamera:
             try:
                 self._read()
                 self.problem = "it ended"
+            except (ProtocolNotFoundError, DemuxerNotFoundError, ValueError) as error:
+                self.problem = getattr(error, "strerror", None) or str(error)
+                self.hopeless = True
+                return
             except (FFmpegError, OSError) as error:
                 self.problem = getattr(error, "strerror", None) or str(error)
             except InputError as error:

@@ -152,7 +152,14 @@ class LiveCameras:
     def _warn(self, text: str) -> None:
         warnings.warn(f"{self.name}: {text}", MvCodecWarning, stacklevel=3)
 
+    def _hopeless(self) -> bool:
+        return any(camera.hopeless for camera in self._cameras.values())
+
     def _silent(self) -> InputError:
+        for camera in self._cameras.values():
+            if camera.hopeless:
+                found = f"an address that this FFmpeg cannot open ({camera.problem})"
+                return InputError(camera.address, found, "another one, or a PyAV that is built with it")
         for camera in self._cameras.values():
             if not camera.waiting:
                 why = f" ({camera.problem})" if camera.problem else ""
@@ -178,7 +185,7 @@ class LiveCameras:
     def _matched(self) -> Iterator[_Found]:
         """(time, pictures) of whole frame sets, until nothing comes for too long."""
         last_s = time.monotonic()
-        while time.monotonic() - last_s < self._settings.patience_s:
+        while time.monotonic() - last_s < self._settings.patience_s and not self._hopeless():
             with self._changed:
                 heads = self._heads()
                 if heads is None:
