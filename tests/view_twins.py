@@ -17,6 +17,8 @@ from mvcodec.synthesis.layered import LayeredSettings
 
 UNKNOWN = -1e9
 BORDER = 2
+STEPS = 32
+"""Places between two pixels that a fetch tells apart."""
 LUMA = np.array([0.299, 0.587, 0.114])
 
 
@@ -163,7 +165,10 @@ class Source:
         at_x, at_y = x + self.shift[0] * d, y + self.shift[1] * d
         if not (-0.5 < at_x < width - 0.5 and -0.5 < at_y < height - 0.5):
             return None
-        at_x, at_y = np.clip(at_x, 0, width - 1), np.clip(at_y, 0, height - 1)
+        at_x, at_y = (
+            np.floor(np.clip(at, 0, size - 1) * STEPS + 0.5) / STEPS
+            for at, size in ((at_x, width), (at_y, height))
+        )
         left, top = int(at_x), int(at_y)
         columns, rows = (
             np.arange(left - 1, left + 3).clip(0, width - 1),

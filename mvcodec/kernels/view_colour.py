@@ -13,16 +13,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvcodec.kernels.view_fetch import BORDER, CONTOUR, add_edge, place_of
+from mvcodec.kernels.view_fetch import BORDER, CONTOUR, add_edge, place_of, step_of
 from mvcodec.kernels.view_marks import list_marked
-from mvcodec.kernels.view_vectors import add_fetched, store_colour
+from mvcodec.kernels.view_vectors import STEPS, add_fetched, store_colour
 
 FloatMap = NDArray[np.float32]
 ByteMap = NDArray[np.uint8]
 
 
 @njit(cache=True, nogil=True)
-def _see(x, y, d, cameras, planes, shifts, weights, tolerance, edge_trust, polynomial, sums):  # type: ignore[no-untyped-def]
+def _see(x, y, d, cameras, planes, shifts, weights, tolerance, edge_trust, fetching, sums):  # type: ignore[no-untyped-def]
     """Sum up what the cameras see of the view's point (x, y) at disparity d."""
     luma, colour, disparities, fetchable = planes
     _, height, width = disparities.shape
@@ -32,28 +32,16 @@ def _see(x, y, d, cameras, planes, shifts, weights, tolerance, edge_trust, polyn
         at_x, at_y, inside = place_of(x, y, d, shifts[i, 0], shifts[i, 1], width, height)
         if not inside:
             continue
-        left, top = int(at_x), int(at_y)
-        part_x, part_y = at_x - np.float32(left), at_y - np.float32(top)
+        fine_x, fine_y = step_of(at_x), step_of(at_y)
+        left, top = fine_x // np.int32(STEPS), fine_y // np.int32(STEPS)
+        phase = np.uintp(fine_y % np.int32(STEPS) * np.int32(STEPS) + fine_x % np.int32(STEPS))
         place = np.uintp((cameras[i] * (height + 2 * BORDER) + top + BORDER) * stride + left + BORDER)
         here = fetchable[place]
         if here == CONTOUR:
             own, trusted = disparities[cameras[i]], weights[i] * edge_trust
-            add_edge(
-                luma, colour, own, sums, np.uintp(0), place, left, top, part_x, part_y, d, tolerance, trusted
-            )
+            add_edge(luma, colour, own, sums, np.uintp(0), place, left, top, phase, d, tolerance, trusted)
         elif abs(here - d) <= tolerance:
-            add_fetched(
-                luma,
-                colour,
-                polynomial,
-                sums,
-                np.uintp(0),
-                place,
-                np.uintp(stride),
-                part_x,
-                part_y,
-                weights[i],
-            )
+            add_fetched(luma, colour, fetching, sums, np.uintp(0), place, np.uintp(stride), phase, weights[i])
 
 
 @njit(cache=True, nogil=True)
@@ -82,14 +70,14 @@ def _add_surfaces(x, y, own, view_disparity, seeing, tolerance, others, surface,
 
     `others`, `surface` and `part` are room for four, nine and nine numbers.
     """
-    cameras, planes, shifts, weights, edge_trust, polynomial = seeing
+    cameras, planes, shifts, weights, edge_trust, fetching = seeing
     count = _surfaces(x, y, view_disparity, tolerance, surface, part)
     scale = part[0] / own[3]
     for value in range(3):
         own[value] *= scale
     own[3] = part[0]
     for k in range(1, count):
-        _see(x, y, surface[k], cameras, planes, shifts, weights, tolerance, edge_trust, polynomial, others)
+        _see(x, y, surface[k], cameras, planes, shifts, weights, tolerance, edge_trust, fetching, others)
         if others[3] > 0:
             scale = part[k] / others[3]
             for value in range(3):
@@ -116,63 +104,65 @@ def _find_contours(y, view_disparity, tolerance, high, low, marks, chosen):  # t
 
 
 @njit(cache=True, nogil=True)
-def _locate(y, disparity, shift, shape, places, insides, parts):  # type: ignore[no-untyped-def]
-    """Where a camera sees one row of the view: the pixels up left of there, whether inside, the fractions."""
+def _locate(y, disparity, shift, shape, places, phases):  # type: ignore[no-untyped-def]
+    """Where a camera sees one row of the view: the pixels up left of there, -1 outside, and the phases."""
     height, width = shape
-    stride = np.int32(width + 2 * BORDER)
+    stride, steps = np.int32(width + 2 * BORDER), np.int32(STEPS)
     shift_x, shift_y = shift
-    for x in range(width):
+    for x in range(width):  # vectorised
         at_x, at_y, inside = place_of(x, y, disparity[x], shift_x, shift_y, width, height)
-        left, top = np.int32(at_x), np.int32(at_y)
-        parts[0, x], parts[1, x] = at_x - np.float32(left), at_y - np.float32(top)
-        places[x] = (top + np.int32(BORDER)) * stride + left + np.int32(BORDER)
-        insides[x] = inside
+        fine_x, fine_y = step_of(at_x), step_of(at_y)
+        phases[x] = fine_y % steps * steps + fine_x % steps
+        place = (fine_y // steps + np.int32(BORDER)) * stride + fine_x // steps + np.int32(BORDER)
+        places[x] = place if inside else np.int32(-1)
 
 
 @njit(cache=True, nogil=True)
 def _add_clear(  # type: ignore[no-untyped-def]
-    planes, polynomial, first, stride, weight, disparity, tolerance, places, insides, parts, sums, seen, edges
+    planes, fetching, first, stride, weight, disparity, tolerance, places, phases, sums, seen, edges
 ):
     """Add what a camera sees of a row off its contours; lists the pixels at these, and gives their number."""
     luma, colour, fetchable = planes
     count = 0
     for x in range(disparity.size):
+        if places[x] < 0:
+            continue
         place = first + np.uintp(places[x])
         here = fetchable[place]
-        edges[count] = x
-        count += insides[x] & (here == CONTOUR)
-        if insides[x] & (abs(here - disparity[x]) <= tolerance):
+        if abs(here - disparity[x]) <= tolerance:
             at = np.uintp(4) * np.uintp(x)
-            add_fetched(luma, colour, polynomial, sums, at, place, stride, parts[0, x], parts[1, x], weight)
+            add_fetched(luma, colour, fetching, sums, at, place, stride, np.uintp(phases[x]), weight)
             seen[x] += 1
+        elif here == CONTOUR:
+            edges[count] = x
+            count += 1
     return count
 
 
 @njit(cache=True, nogil=True)
 def _add_edges(  # type: ignore[no-untyped-def]
-    luma, colour, own, first, disparity, weight, tolerance, chosen, places, parts, sums, seen
+    luma, colour, own, first, disparity, weight, tolerance, chosen, places, phases, sums, seen
 ):
     """Add what a camera sees at the chosen pixels of a row, at its contours."""
     stride = own.shape[1] + 2 * BORDER
     for x in chosen:
         left, top = places[x] % stride - BORDER, places[x] // stride - BORDER
         place, at = first + np.uintp(places[x]), np.uintp(4) * np.uintp(x)
-        part_x, part_y = parts[0, x], parts[1, x]
         seen[x] += add_edge(
-            luma, colour, own, sums, at, place, left, top, part_x, part_y, disparity[x], tolerance, weight
+            luma, colour, own, sums, at, place, left, top, phases[x], disparity[x], tolerance, weight
         )
 
 
 @njit(cache=True, nogil=True)
 def blend(
     cameras: NDArray[np.int64],
-    planes: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]],
+    planes: tuple[NDArray[np.int16], NDArray[np.int16], NDArray[np.float32], NDArray[np.float32]],
     shifts: NDArray[np.float32],
     weights: NDArray[np.float32],
     view_disparity: FloatMap,
     tolerance: float,
     edge_trust: float,
-    polynomial: NDArray[np.float32],
+    fetching: NDArray[np.int16],
     out: NDArray[np.uint8],
     seen_by: ByteMap,
     first: int,
@@ -182,18 +172,19 @@ def blend(
 
     A camera counts where its own disparity there agrees. At a contour the surfaces of the 3 x 3 window
     are blended (weight 1 / (1 + distance^2)), which gives the soft edge that a lens gives, and pixels at
-    the cameras' own contours, whose colours are mixed, count `edge_trust` as much.
+    the cameras' own contours, whose colours are mixed, count `edge_trust` as much. Places are rounded
+    to 1 / STEPS px.
 
     Args:
         cameras: int64 (N,), which of the R real cameras see the view.
-        planes: of every real camera: luma float32 (R, H + 4, W + 4) and colour differences
-            (R, H + 4, W + 4, 2), disparity (R, H, W), px, and where it can be fetched (R, H + 4, W + 4);
-            see `view_planes`.
+        planes: of every real camera: luma int16 (R, H + 4, W + 4) and colour differences
+            (R, H + 4, W + 4, 2); disparity float32 (R, H, W), px, and where it can be fetched
+            (R, H + 4, W + 4); see `view_planes`.
         shifts: float32 (N, 2), px (x, y) from the view to the camera for each px of disparity.
         weights: float32 (N,), above 0.
         view_disparity: float32 (H, W), known everywhere.
         tolerance: px within which disparities are one surface.
-        polynomial: of the cubic fetch of luma, see `view_vectors.cubic_polynomial`.
+        fetching: weights of the cubic fetch of luma, see `view_vectors.fetch_weights`.
         out: uint8 (H, W, 3) RGB, C-contiguous, rows first..last-1 overwritten; black where no camera
             sees the pixel.
         seen_by: uint8 (H, W), overwritten with the number of cameras; 0 where none sees the pixel.
@@ -205,11 +196,11 @@ def blend(
     stride = width + 2 * BORDER
     plane = (height + 2 * BORDER) * stride
     near_px, trust = np.float32(tolerance), np.float32(edge_trust)
-    seeing = cameras, (luma, colour, disparities, fetchable), shifts, weights, trust, polynomial
+    seeing = cameras, (luma, colour, disparities, fetchable), shifts, weights, trust, fetching
     surface, part, others = np.empty(9, np.float32), np.empty(9, np.float32), np.empty(4, np.float32)
     high, low = np.empty(width + 2, np.float32), np.empty(width + 2, np.float32)
-    parts, insides = np.empty((2, width), np.float32), np.empty(width, np.bool_)
-    places, chosen = np.empty(width, np.int32), np.empty(width, np.int32)
+    places, phases = np.empty(width, np.int32), np.empty(width, np.int32)
+    chosen = np.empty(width, np.int32)
     sums, marks = np.empty((width, 4), np.float32), np.empty(width, np.uint8)
     flat, pixels = sums.ravel(), out.ravel()
     for y in range(first, last):
@@ -218,18 +209,17 @@ def blend(
         seen[:] = 0
         for i in range(cameras.size):
             start = np.uintp(cameras[i] * plane)
-            _locate(y, disparity, (shifts[i, 0], shifts[i, 1]), shape, places, insides, parts)
+            _locate(y, disparity, (shifts[i, 0], shifts[i, 1]), shape, places, phases)
             count = _add_clear(
                 (luma, colour, fetchable),
-                polynomial,
+                fetching,
                 start,
                 np.uintp(stride),
                 weights[i],
                 disparity,
                 near_px,
                 places,
-                insides,
-                parts,
+                phases,
                 flat,
                 seen,
                 chosen,
@@ -244,7 +234,7 @@ def blend(
                 near_px,
                 chosen[:count],
                 places,
-                parts,
+                phases,
                 flat,
                 seen,
             )

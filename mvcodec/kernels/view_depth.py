@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mvcodec.kernels.view_fetch import BORDER
 from mvcodec.kernels.view_marks import list_marked
+from mvcodec.kernels.view_vectors import LEVELS
 
 FloatMap = NDArray[np.float32]
 
@@ -95,20 +96,20 @@ def _denies(x, y, d, luma, camera, maps, lumas, shift, limits):  # type: ignore[
         return False
     for v in range(row + BORDER - 1, row + BORDER + 2):
         for u in range(column + BORDER - 1, column + BORDER + 2):
-            if abs(lumas[camera, v, u] - luma) <= contrast:
+            if abs(np.float32(lumas[camera, v, u]) - luma) <= contrast:
                 return False
     return True
 
 
 @njit(cache=True, nogil=True, inline="always")
 def _luma_of(x, y, d, who, cameras, lumas, shifts, weights):  # type: ignore[no-untyped-def]
-    """Mean luma that the cameras `who` have for the view's point (x, y) at d."""
+    """Mean luma, in 1 / LEVELS, that the cameras `who` have for the view's point (x, y) at d."""
     height, width = lumas.shape[1] - 2 * BORDER, lumas.shape[2] - 2 * BORDER
     mean = total = np.float32(0)
     for i in who:
         column, row = _pixel(x, y, d, shifts[i])
         column, row = min(max(column, 0), width - 1), min(max(row, 0), height - 1)
-        mean += weights[i] * lumas[cameras[i], row + BORDER, column + BORDER]
+        mean += weights[i] * np.float32(lumas[cameras[i], row + BORDER, column + BORDER])
         total += weights[i]
     return mean / total
 
@@ -162,7 +163,7 @@ def vote(
     moved: NDArray[np.float32],
     cameras: NDArray[np.int64],
     maps: NDArray[np.float32],
-    lumas: NDArray[np.float32],
+    lumas: NDArray[np.int16],
     shifts: NDArray[np.float32],
     weights: NDArray[np.float32],
     tolerance: float,
@@ -185,8 +186,7 @@ def vote(
         moved: float32 (N, H + 2, W + 2), px, or UNKNOWN; see `splat`.
         cameras: int64 (N,), which of the R real cameras were moved.
         maps: float32 (R, H, W), px, of every real camera.
-        lumas: float32 (R, H + 4, W + 4), grey levels, see `mvcodec.kernels.view_fetch`;
-            of any size where denial is 0.
+        lumas: int16 (R, H + 4, W + 4), see `view_planes.split_luma`; of any size where denial is 0.
         shifts: float32 (N, 2), px (x, y) from the view to the camera for each px of disparity.
         weights: float32 (N,), of the cameras, above 0.
         out: float32 (H, W), rows first..last-1 overwritten; UNKNOWN where no camera knows.
@@ -195,7 +195,7 @@ def vote(
     near = np.empty(count, np.float32)
     who = np.empty(count, np.int64)
     near_px, least, share = np.float32(tolerance), np.float32(ratio), np.float32(denial)
-    limits = near_px, np.float32(contrast)
+    limits = near_px, np.float32(LEVELS * contrast)
     nearest, farthest = np.empty(width, np.float32), np.empty(width, np.float32)
     total, marks = np.empty(width, np.float32), np.empty(width, np.uint8)
     chosen = np.empty(width, np.int32)

@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mvcodec.kernels.view_vectors import LEVELS, STEPS
+
 BORDER = 2
 """Pixels that `view_planes` repeats around a picture, so that a cubic fetch never leaves it."""
 CONTOUR = np.float32(-1e9)
@@ -30,15 +32,23 @@ def place_of(x, y, d, shift_x, shift_y, width, height):  # type: ignore[no-untyp
     return at_x, at_y, inside
 
 
+@njit(cache=True, nogil=True, inline="always")
+def step_of(at):  # type: ignore[no-untyped-def]
+    """A place, 0 or above, in whole steps between pixels."""
+    return np.int32(at * np.float32(STEPS) + np.float32(0.5))
+
+
 @njit(cache=True, nogil=True)
 def add_edge(  # type: ignore[no-untyped-def]
-    luma, colour, disparity, sums, at, place, left, top, part_x, part_y, d, tolerance, weight
+    luma, colour, disparity, sums, at, place, left, top, phase, d, tolerance, weight
 ):
     """Add weight * (Y, R - Y, B - Y, 1) to four of `sums`, linear between those of the four pixels at `place`
-    that lie at disparity d, each by its share; whether there is any."""
+    that lie at disparity d, each by its share; whether there is any. See `view_vectors.add_fetched`."""
     height, width = disparity.shape
     stride = np.uintp(width + 2 * BORDER)
     share = grey = red = blue = np.float32(0)
+    part_x = np.float32(phase % STEPS) * np.float32(1 / STEPS)
+    part_y = np.float32(phase // STEPS) * np.float32(1 / STEPS)
     for j in range(2):
         for i in range(2):
             # The border repeats the pixels at the margin, so that `place` need not be kept inside.
@@ -47,14 +57,15 @@ def add_edge(  # type: ignore[no-untyped-def]
             part = part if abs(here - d) <= tolerance else np.float32(0)
             pixel = place + np.uintp(j) * stride + np.uintp(i)
             share += part
-            grey += part * luma[pixel]
-            red += part * colour[np.uintp(2) * pixel]
-            blue += part * colour[np.uintp(2) * pixel + np.uintp(1)]
+            grey += part * np.float32(luma[pixel])
+            red += part * np.float32(colour[np.uintp(2) * pixel])
+            blue += part * np.float32(colour[np.uintp(2) * pixel + np.uintp(1)])
     if share <= np.float32(1e-3):
         return False
     one, two, three = np.uintp(1), np.uintp(2), np.uintp(3)
-    sums[at] += weight * grey
-    sums[at + one] += weight * red
-    sums[at + two] += weight * blue
+    of_level = weight * np.float32(1 / LEVELS)
+    sums[at] += of_level * grey
+    sums[at + one] += of_level * red
+    sums[at + two] += of_level * blue
     sums[at + three] += weight * share
     return True

@@ -7,29 +7,37 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvcodec.kernels.view_fetch import BORDER, CONTOUR
+from mvcodec.kernels.view_vectors import LEVELS
 
 FloatMap = NDArray[np.float32]
 
 
 @njit(cache=True, nogil=True)
-def split_luma(picture: NDArray[np.uint8], luma: FloatMap, colour: NDArray[np.float32]) -> None:
-    """RGB to luma and colour differences, with a border of repeated edge pixels.
+def split_luma(picture: NDArray[np.uint8], luma: NDArray[np.int16], colour: NDArray[np.int16]) -> None:
+    """RGB to luma and colour differences, in 1 / LEVELS of a grey level, with a border of repeated pixels.
 
     Args:
         picture: uint8 (H, W, 3).
-        luma: float32 (H + 2 BORDER, W + 2 BORDER), overwritten with Y = .299 R + .587 G + .114 B.
-        colour: float32 (H + 2 BORDER, W + 2 BORDER, 2), overwritten with R - Y and B - Y.
+        luma: int16 (H + 2 BORDER, W + 2 BORDER), overwritten with Y = .299 R + .587 G + .114 B.
+        colour: int16 (H + 2 BORDER, W + 2 BORDER, 2), overwritten with R - Y and B - Y.
     """
     height, width, _ = picture.shape
-    for y in range(height + 2 * BORDER):
-        v = min(max(y - BORDER, 0), height - 1)
-        for x in range(width + 2 * BORDER):
-            u = min(max(x - BORDER, 0), width - 1)
-            red, green, blue = picture[v, u, 0], picture[v, u, 1], picture[v, u, 2]
-            grey = np.float32(0.299) * red + np.float32(0.587) * green + np.float32(0.114) * blue
-            luma[y, x] = grey
-            colour[y, x, 0] = red - grey
-            colour[y, x, 1] = blue - grey
+    levels, half = np.float32(LEVELS), np.float32(0.5)
+    grey, red, blue = np.empty(width, np.int32), np.empty(width, np.int32), np.empty(width, np.int32)
+    for y in range(height):
+        row, greys = picture[y].ravel(), luma[y + BORDER, BORDER:-BORDER]
+        differences = colour[y + BORDER, BORDER:-BORDER].ravel()
+        for x in range(width):  # three loops: each is vectorised by itself
+            r, g, b = np.float32(row[3 * x]), np.float32(row[3 * x + 1]), np.float32(row[3 * x + 2])
+            sum_ = np.float32(0.299) * r + np.float32(0.587) * g + np.float32(0.114) * b
+            grey[x] = np.int32(levels * sum_ + half)
+            red[x], blue[x] = np.int32(levels * r) - grey[x], np.int32(levels * b) - grey[x]
+        for x in range(width):
+            greys[x] = np.int16(grey[x])
+        for x in range(width):
+            differences[2 * x], differences[2 * x + 1] = np.int16(red[x]), np.int16(blue[x])
+    _repeat_edges(luma)
+    _repeat_edges(colour)
 
 
 @njit(cache=True, nogil=True)

@@ -6,6 +6,7 @@ and multiplications in the same order, and so the same results, everywhere.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,18 +16,39 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 FOUR = ir.VectorType(ir.FloatType(), 4)
-SHORT = ir.IntType(16)
+SHORT, WORD = ir.IntType(16), ir.IntType(32)
 WORD_BYTES = 4
 """Loads begin at any float32."""
 
+STEPS = 32
+"""Places between two pixels that a fetch tells apart."""
 
-def cubic_polynomial(a: float) -> NDArray[np.float32]:
-    """float32 (16,): the four weights of cubic convolution at fraction t, as factors of t^3, t^2, t and 1.
+LEVELS = 64
+"""Steps of a grey level in planes of whole numbers."""
 
-    Keys 1981, equation 15, with its parameter a.
+ONE = 1 << 14
+"""What the weights of a fetch sum up to."""
+
+SHARES = 24
+"""Weights of one place: 4 x 4 of luma by rows; then of the 2 x 2 pixels of colour, see `fetch_weights`."""
+
+
+@cache
+def fetch_weights(a: float) -> NDArray[np.int16]:
+    """int16 (STEPS^2 * SHARES,), in 1 / ONE: what the pixels around each place between pixels count.
+
+    Luma by cubic convolution (Keys 1981, equation 15, with its parameter a), colour linearly: for each of the
+    two columns its upper and its lower pixel, twice. Rows of STEPS places, as `phase` counts them.
     """
+    t = np.arange(STEPS) / STEPS
     cubes, squares = [a, a + 2, -(a + 2), -a], [-2 * a, -(a + 3), 2 * a + 3, a]
-    return np.array([cubes, squares, [a, 0, -a, 0], [0, 1, 0, 0]], np.float32).ravel()
+    cubic = np.stack([t**3, t**2, t, t**0], axis=1) @ np.array([cubes, squares, [a, 0, -a, 0], [0, 1, 0, 0]])
+    linear = np.stack([1 - t, t], axis=1)
+    luma = np.einsum("yj,xi->yxji", cubic, cubic).reshape(STEPS * STEPS, 16)
+    colour = np.einsum("yj,xi->yxij", linear, linear).reshape(STEPS * STEPS, 2, 1, 2).repeat(2, axis=2)
+    whole = np.rint(luma * ONE).astype(np.int16)
+    whole[np.arange(len(whole)), luma.argmax(axis=1)] += (ONE - whole.sum(axis=1)).astype(np.int16)
+    return np.hstack([whole, np.rint(colour.reshape(-1, 8) * ONE).astype(np.int16)]).ravel()
 
 
 def _address(builder, pointer, index):  # type: ignore[no-untyped-def]
@@ -53,68 +75,82 @@ def _add_product(builder, total, one, other):  # type: ignore[no-untyped-def]
     return builder.fadd(total, builder.fmul(one, other))
 
 
-def _weights(builder, polynomial, t):  # type: ignore[no-untyped-def]
-    """The four weights of a cubic fetch at fraction t."""
-    cubes, squares, lines, ones = (
-        _load(builder, polynomial, ir.Constant(ir.IntType(64), 4 * power)) for power in range(4)
-    )
-    found = _add_product(builder, squares, cubes, t)
-    return _add_product(builder, ones, _add_product(builder, lines, found, t), t)
+def _shorts(builder, pointer, index, count):  # type: ignore[no-untyped-def]
+    kind = ir.VectorType(SHORT, count).as_pointer()
+    return builder.load(builder.bitcast(builder.gep(pointer, [index]), kind), align=2)
 
 
-def _cubic(builder, luma, polynomial, place, stride, t_x, t_y):  # type: ignore[no-untyped-def]
+def _shuffle(builder, one, other, lanes):  # type: ignore[no-untyped-def]
+    mask = ir.Constant(ir.VectorType(WORD, len(lanes)), lanes)
+    return builder.shuffle_vector(one, other, mask)
+
+
+def _dot(builder, one, other):  # type: ignore[no-untyped-def]
+    """Products of eight short numbers, added in pairs: what processors have one instruction for."""
+    wide = ir.VectorType(WORD, 8)
+    products = builder.mul(builder.sext(one, wide), builder.sext(other, wide))
+    even, odd = (_shuffle(builder, products, products, list(range(first, 8, 2))) for first in (0, 1))
+    return builder.add(even, odd)
+
+
+def _luma(builder, plane, weights, share, place, stride):  # type: ignore[no-untyped-def]
     """Luma of the 4 x 4 window whose second pixel of the second row is `place`, in all lanes."""
-    across, down = _weights(builder, polynomial, t_x), _weights(builder, polynomial, t_y)
     at = builder.sub(builder.sub(place, stride), ir.Constant(place.type, 1))
-    column = builder.fmul(_load(builder, luma, at), _pick(builder, down, 0, 0, 0, 0))
-    for row in range(1, 4):
+    rows = []
+    for _ in range(4):
+        rows.append(_shorts(builder, plane, at, 4))
         at = builder.add(at, stride)
-        column = _add_product(builder, column, _load(builder, luma, at), _pick(builder, down, *[row] * 4))
-    products = builder.fmul(column, across)
-    pairs = builder.fadd(products, _pick(builder, products, 2, 3, 0, 1))
-    return builder.fadd(pairs, _pick(builder, pairs, 1, 0, 3, 2))
+    total = None
+    for half in (0, 1):
+        pixels = _shuffle(builder, rows[2 * half], rows[2 * half + 1], list(range(8)))
+        at = builder.add(share, ir.Constant(share.type, 8 * half))
+        product = _dot(builder, pixels, _shorts(builder, weights, at, 8))
+        total = product if total is None else builder.add(total, product)
+    pairs = builder.add(total, _shuffle(builder, total, total, [2, 3, 0, 1]))
+    return builder.add(pairs, _shuffle(builder, pairs, pairs, [1, 0, 3, 2]))
 
 
-def _linear(builder, colour, place, stride, t_x, t_y):  # type: ignore[no-untyped-def]
+def _colour(builder, plane, weights, share, place, stride):  # type: ignore[no-untyped-def]
     """(R - Y, B - Y) of the 2 x 2 window whose upper left pixel is `place`, twice."""
     two = ir.Constant(place.type, 2)
-    top = _load(builder, colour, builder.mul(place, two))
-    low = _load(builder, colour, builder.mul(builder.add(place, stride), two))
-    between = _add_product(builder, top, builder.fsub(low, top), t_y)
-    left, right = _pick(builder, between, 0, 1, 0, 1), _pick(builder, between, 2, 3, 2, 3)
-    return _add_product(builder, left, builder.fsub(right, left), t_x)
+    top = _shorts(builder, plane, builder.mul(place, two), 4)
+    low = _shorts(builder, plane, builder.mul(builder.add(place, stride), two), 4)
+    pixels = _shuffle(builder, top, low, [0, 4, 1, 5, 2, 6, 3, 7])
+    at = builder.add(share, ir.Constant(share.type, 16))
+    columns = _dot(builder, pixels, _shorts(builder, weights, at, 8))
+    return builder.add(columns, _shuffle(builder, columns, columns, [2, 3, 0, 1]))
 
 
-def _add_fetched(_typing, luma, colour, polynomial, sums, at, place, stride, part_x, part_y, weight):  # type: ignore[no-untyped-def]
+def _add_fetched(_typing, luma, colour, weights, sums, at, place, stride, phase, weight):  # type: ignore[no-untyped-def]
     """Add weight * (Y, R - Y, B - Y, 1) of one place between pixels to four of `sums` from index `at` on.
 
     Args:
-        luma, colour: flat float32 planes with borders, see `view_planes`; fetched cubic and linear.
-        polynomial: see `cubic_polynomial`.
+        luma, colour: flat int16 planes with borders, see `view_planes`; fetched cubic and linear.
+        weights: see `fetch_weights`.
         sums: flat float32.
         at, place, stride: uintp; index into `sums`, of the pixel up left in `luma`, and pixels of its rows.
-        part_x, part_y: float32, how far right of and below that pixel, 0..1.
+        phase: uintp, where between the pixels: STEPS * steps down + steps right.
         weight: float32.
     """
 
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        planes = [
+        luma, colour, weights, sums = (
             context.make_array(kind)(context, builder, value).data
             for kind, value in zip(signature.args[:4], values[:4], strict=True)
-        ]
-        luma, colour, polynomial, sums = planes
-        at, place, stride = values[4:7]
-        t_x, t_y, weight = (_fill(builder, value) for value in values[7:])
-        grey = _cubic(builder, luma, polynomial, place, stride, t_x, t_y)
-        differences = _linear(builder, colour, place, stride, t_x, t_y)
-        pixel = _pick(builder, grey, 0, 4, 5, 0, other=differences)
-        one = ir.Constant(ir.FloatType(), 1.0)
-        pixel = builder.insert_element(pixel, one, ir.Constant(ir.IntType(32), 3))
-        total = _add_product(builder, _load(builder, sums, at), weight, pixel)
+        )
+        at, place, stride, phase, weight = values[4:]
+        share = builder.mul(phase, ir.Constant(phase.type, SHARES))
+        grey = _luma(builder, luma, weights, share, place, stride)
+        differences = _colour(builder, colour, weights, share, place, stride)
+        pixel = _shuffle(builder, grey, differences, [0, 4, 5, 0])
+        unit = LEVELS * ONE
+        pixel = builder.insert_element(pixel, ir.Constant(WORD, unit), ir.Constant(WORD, 3))
+        factor = _fill(builder, builder.fmul(weight, ir.Constant(ir.FloatType(), 1.0 / unit)))
+        total = _add_product(builder, _load(builder, sums, at), factor, builder.sitofp(pixel, FOUR))
         builder.store(total, _address(builder, sums, at), align=WORD_BYTES)
         return context.get_dummy_value()
 
-    arguments = luma, colour, polynomial, sums, at, place, stride, part_x, part_y, weight
+    arguments = luma, colour, weights, sums, at, place, stride, phase, weight
     return types.void(*arguments), generate
 
 

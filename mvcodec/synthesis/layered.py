@@ -79,8 +79,8 @@ class _Sources:
         padded = (count, height + 2 * BORDER, width + 2 * BORDER)
         self.decoded = decoded
         self.spread = measure_spread(decoded) if spread is None else spread
-        self.lumas = np.empty(padded, np.float32)
-        self.colours = np.empty((*padded, 2), np.float32)
+        self.lumas = np.empty(padded, np.int16)
+        self.colours = np.empty((*padded, 2), np.int16)
         self.disparities = np.empty((count, height, width), np.float32)
         self.fetchable = np.empty(padded, np.float32)
         self._ready: set[Position] = set()
@@ -103,7 +103,7 @@ class _Sources:
         mark_contours(values, tolerance_px, self.fetchable[place])
 
     @property
-    def planes(self) -> tuple[FloatMap, FloatMap, FloatMap, FloatMap]:
+    def planes(self) -> tuple[NDArray[np.int16], NDArray[np.int16], FloatMap, FloatMap]:
         """The arrays in the order of `kernels.view_colour.blend`."""
         return self.lumas, self.colours, self.disparities, self.fetchable
 
@@ -180,7 +180,7 @@ class Layered:
             disparity,
             settings.tolerance_px,
             settings.edge_trust,
-            view_vectors.cubic_polynomial(settings.sharpness),
+            view_vectors.fetch_weights(settings.sharpness),
             pixels,
             seen_by,
         )

@@ -26,7 +26,7 @@ class Ballot:
 
 def view_disparity(
     maps: NDArray[np.float32],
-    lumas: NDArray[np.float32],
+    lumas: NDArray[np.int16],
     seen: CellCameras,
     ballot: Ballot,
     background_px: float,
@@ -35,8 +35,8 @@ def view_disparity(
 
     Args:
         maps: float32 (R, H, W), px, of every real camera.
-        lumas: float32 (R, H + 4, W + 4), see `mvcodec.kernels.view_fetch`; not looked at where nothing
-            may be denied.
+        lumas: int16 (R, H + 4, W + 4), see `mvcodec.kernels.view_planes`; not looked at where nothing may
+            be denied.
         background_px: disparity of rows of which no camera knows anything.
 
     Returns:
