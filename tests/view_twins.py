@@ -165,11 +165,11 @@ class Source:
         at_x, at_y = x + self.shift[0] * d, y + self.shift[1] * d
         if not (-0.5 < at_x < width - 0.5 and -0.5 < at_y < height - 0.5):
             return None
-        at_x, at_y = (
-            np.floor(np.clip(at, 0, size - 1) * STEPS + 0.5) / STEPS
-            for at, size in ((at_x, width), (at_y, height))
-        )
+        at_x, at_y = np.clip(at_x, 0, width - 1), np.clip(at_y, 0, height - 1)
         left, top = int(at_x), int(at_y)
+        at_x, at_y = (
+            pixel + np.floor((at - pixel) * STEPS + 0.5) / STEPS for at, pixel in ((at_x, left), (at_y, top))
+        )
         columns, rows = (
             np.arange(left - 1, left + 3).clip(0, width - 1),
             np.arange(top - 1, top + 3).clip(0, height - 1),

@@ -13,9 +13,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvcodec.kernels.view_fetch import BORDER, CONTOUR, add_edge, place_of, step_of
+from mvcodec.kernels.view_fetch import BORDER, CONTOUR, add_edge, phase_of, place_of
 from mvcodec.kernels.view_marks import list_marked
-from mvcodec.kernels.view_vectors import STEPS, add_fetched, store_colour
+from mvcodec.kernels.view_vectors import add_fetched, store_colour
 
 FloatMap = NDArray[np.float32]
 ByteMap = NDArray[np.uint8]
@@ -32,9 +32,8 @@ def _see(x, y, d, cameras, planes, shifts, weights, tolerance, edge_trust, fetch
         at_x, at_y, inside = place_of(x, y, d, shifts[i, 0], shifts[i, 1], width, height)
         if not inside:
             continue
-        fine_x, fine_y = step_of(at_x), step_of(at_y)
-        left, top = fine_x // np.int32(STEPS), fine_y // np.int32(STEPS)
-        phase = np.uintp(fine_y % np.int32(STEPS) * np.int32(STEPS) + fine_x % np.int32(STEPS))
+        left, top = np.int32(at_x), np.int32(at_y)
+        phase = np.uintp(phase_of(at_x - np.float32(left), at_y - np.float32(top)))
         place = np.uintp((cameras[i] * (height + 2 * BORDER) + top + BORDER) * stride + left + BORDER)
         here = fetchable[place]
         if here == CONTOUR:
@@ -107,13 +106,13 @@ def _find_contours(y, view_disparity, tolerance, high, low, marks, chosen):  # t
 def _locate(y, disparity, shift, shape, places, phases):  # type: ignore[no-untyped-def]
     """Where a camera sees one row of the view: the pixels up left of there, -1 outside, and the phases."""
     height, width = shape
-    stride, steps = np.int32(width + 2 * BORDER), np.int32(STEPS)
+    stride = np.int32(width + 2 * BORDER)
     shift_x, shift_y = shift
     for x in range(width):  # vectorised
         at_x, at_y, inside = place_of(x, y, disparity[x], shift_x, shift_y, width, height)
-        fine_x, fine_y = step_of(at_x), step_of(at_y)
-        phases[x] = fine_y % steps * steps + fine_x % steps
-        place = (fine_y // steps + np.int32(BORDER)) * stride + fine_x // steps + np.int32(BORDER)
+        left, top = np.int32(at_x), np.int32(at_y)
+        phases[x] = phase_of(at_x - np.float32(left), at_y - np.float32(top))
+        place = (top + np.int32(BORDER)) * stride + left + np.int32(BORDER)
         places[x] = place if inside else np.int32(-1)
 
 
@@ -173,7 +172,7 @@ def blend(
     A camera counts where its own disparity there agrees. At a contour the surfaces of the 3 x 3 window
     are blended (weight 1 / (1 + distance^2)), which gives the soft edge that a lens gives, and pixels at
     the cameras' own contours, whose colours are mixed, count `edge_trust` as much. Places are rounded
-    to 1 / STEPS px.
+    to 1 / 32 px between two pixels.
 
     Args:
         cameras: int64 (N,), which of the R real cameras see the view.

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mvcodec.kernels.view_vectors import LEVELS, STEPS
+from mvcodec.kernels.view_vectors import LEVELS, PHASES, STEPS
 
 BORDER = 2
 """Pixels that `view_planes` repeats around a picture, so that a cubic fetch never leaves it."""
@@ -33,9 +33,11 @@ def place_of(x, y, d, shift_x, shift_y, width, height):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True, inline="always")
-def step_of(at):  # type: ignore[no-untyped-def]
-    """A place, 0 or above, in whole steps between pixels."""
-    return np.int32(at * np.float32(STEPS) + np.float32(0.5))
+def phase_of(part_x, part_y):  # type: ignore[no-untyped-def]
+    """Where between pixels a place is, 0..1 right of one and below it: PHASES * steps down + steps right."""
+    right = np.int32(part_x * np.float32(STEPS) + np.float32(0.5))
+    down = np.int32(part_y * np.float32(STEPS) + np.float32(0.5))
+    return down * np.int32(PHASES) + right
 
 
 @njit(cache=True, nogil=True)
@@ -47,8 +49,8 @@ def add_edge(  # type: ignore[no-untyped-def]
     height, width = disparity.shape
     stride = np.uintp(width + 2 * BORDER)
     share = grey = red = blue = np.float32(0)
-    part_x = np.float32(phase % STEPS) * np.float32(1 / STEPS)
-    part_y = np.float32(phase // STEPS) * np.float32(1 / STEPS)
+    part_x = np.float32(phase % PHASES) * np.float32(1 / STEPS)
+    part_y = np.float32(phase // PHASES) * np.float32(1 / STEPS)
     for j in range(2):
         for i in range(2):
             # The border repeats the pixels at the margin, so that `place` need not be kept inside.

@@ -21,7 +21,10 @@ WORD_BYTES = 4
 """Loads begin at any float32."""
 
 STEPS = 32
-"""Places between two pixels that a fetch tells apart."""
+"""A fetch rounds where it is between two pixels to so many steps."""
+
+PHASES = STEPS + 1
+"""Both pixels count, so that rounding never makes another pair of them."""
 
 LEVELS = 64
 """Steps of a grey level in planes of whole numbers."""
@@ -35,17 +38,17 @@ SHARES = 24
 
 @cache
 def fetch_weights(a: float) -> NDArray[np.int16]:
-    """int16 (STEPS^2 * SHARES,), in 1 / ONE: what the pixels around each place between pixels count.
+    """int16 (PHASES^2 * SHARES,), in 1 / ONE: what the pixels around each place between pixels count.
 
     Luma by cubic convolution (Keys 1981, equation 15, with its parameter a), colour linearly: for each of the
-    two columns its upper and its lower pixel, twice. Rows of STEPS places, as `phase` counts them.
+    two columns its upper and its lower pixel, twice. Places are counted as `view_fetch.phase_of` does.
     """
-    t = np.arange(STEPS) / STEPS
+    t = np.arange(PHASES) / STEPS
     cubes, squares = [a, a + 2, -(a + 2), -a], [-2 * a, -(a + 3), 2 * a + 3, a]
     cubic = np.stack([t**3, t**2, t, t**0], axis=1) @ np.array([cubes, squares, [a, 0, -a, 0], [0, 1, 0, 0]])
     linear = np.stack([1 - t, t], axis=1)
-    luma = np.einsum("yj,xi->yxji", cubic, cubic).reshape(STEPS * STEPS, 16)
-    colour = np.einsum("yj,xi->yxij", linear, linear).reshape(STEPS * STEPS, 2, 1, 2).repeat(2, axis=2)
+    luma = np.einsum("yj,xi->yxji", cubic, cubic).reshape(-1, 16)
+    colour = np.einsum("yj,xi->yxij", linear, linear).reshape(-1, 2, 1, 2).repeat(2, axis=2)
     whole = np.rint(luma * ONE).astype(np.int16)
     whole[np.arange(len(whole)), luma.argmax(axis=1)] += (ONE - whole.sum(axis=1)).astype(np.int16)
     return np.hstack([whole, np.rint(colour.reshape(-1, 8) * ONE).astype(np.int16)]).ravel()
@@ -129,7 +132,7 @@ def _add_fetched(_typing, luma, colour, weights, sums, at, place, stride, phase,
         weights: see `fetch_weights`.
         sums: flat float32.
         at, place, stride: uintp; index into `sums`, of the pixel up left in `luma`, and pixels of its rows.
-        phase: uintp, where between the pixels: STEPS * steps down + steps right.
+        phase: uintp, where between the pixels, see `view_fetch.phase_of`.
         weight: float32.
     """
 
