@@ -25,27 +25,35 @@ def _between(upper, lower, up, line):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _at_edge(small, picture, small_picture, y, x, dy, dx, agree, per_step, costs, values):  # type: ignore[no-untyped-def]
-    """The disparity of one pixel by its colour; dy, dx: from it to sample (0, 0), in samples."""
+    """The disparity of one pixel by its colour; dy, dx: from it to sample (0, 0), in samples.
+
+    Choices are selections, not branches: at an edge no processor foresees them.
+    """
     rows, columns = small.shape
-    best = np.float32(np.inf)
-    chosen = np.float32(0)
+    zero, one = np.float32(0), np.float32(1)
+    red, green, blue = np.int32(picture[y, x, 0]), np.int32(picture[y, x, 1]), np.int32(picture[y, x, 2])
+    best, chosen = np.float32(np.inf), zero
     count = 0
     for j in range(max(y // 2 - 1, 0), min(y // 2 + 2, rows)):
+        down = (np.float32(j) + dy) * (np.float32(j) + dy)
         for i in range(max(x // 2 - 1, 0), min(x // 2 + 2, columns)):
-            difference = np.int32(0)
-            for channel in range(3):
-                difference += abs(np.int32(picture[y, x, channel]) - np.int32(small_picture[j, i, channel]))
-            cost = difference * per_step + (j + dy) * (j + dy) + (i + dx) * (i + dx)
-            costs[count], values[count] = cost, small[j, i]
+            difference = np.int32(
+                abs(red - np.int32(small_picture[j, i, 0]))
+                + abs(green - np.int32(small_picture[j, i, 1]))
+                + abs(blue - np.int32(small_picture[j, i, 2]))
+            )
+            aside = (np.float32(i) + dx) * (np.float32(i) + dx)
+            cost, value = np.float32(difference) * per_step + (down + aside), small[j, i]
+            costs[count], values[count] = cost, value
             count += 1
-            if cost < best:
-                best, chosen = cost, small[j, i]
-    total, weights = np.float32(0), np.float32(0)
+            better = cost < best
+            best, chosen = cost if better else best, value if better else chosen
+    total, weights = zero, zero
     for k in range(count):
-        if abs(values[k] - chosen) <= agree:
-            weight = 1 / ((1 + costs[k]) * (1 + costs[k]))
-            total += weight * values[k]
-            weights += weight
+        more = one + costs[k]
+        weight = one / (more * more) if abs(values[k] - chosen) <= agree else zero
+        total += weight * values[k]
+        weights += weight
     return total / weights
 
 
