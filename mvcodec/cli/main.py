@@ -77,6 +77,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     # OpenCV writes lines of its own to standard error about files that we report; it reads this when loaded.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
+    # We hand out jobs ourselves; threads inside of BLAS wait for each other, and busily, where cores are few.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     arguments = sys.argv[1:] if argv is None else list(argv)
     try:
         with checked_streams(), warnings.catch_warnings(), WarningLines() as lines:
