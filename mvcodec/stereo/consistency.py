@@ -39,10 +39,12 @@ def left_right_check(
     Returns:
         bool (H, W); False where unknown, contradicted, or seen outside the partner's picture.
     """
-    from mvcodec.kernels.matching_rows import consistent
+    from mvcodec.kernels.table import kernel
 
     sign = 1 if partner_is_right else -1
-    kept: Mask = consistent(values_px, known, other_px, other_known, sign, tolerance_px)
+    kept: Mask = kernel("matching_rows.consistent")(
+        values_px, known, other_px, other_known, sign, tolerance_px
+    )
     return kept
 
 
@@ -60,12 +62,12 @@ def fill_from_farther(values_px: FloatMap, valid: Mask, fallback_px: float) -> F
     Returns:
         float32 (H, W), finite everywhere where the valid values are.
     """
-    from mvcodec.kernels.matching_rows import fill_rows
+    from mvcodec.kernels.table import kernel
 
     rows = np.flatnonzero(valid.any(axis=1))
     if rows.size == 0:
         return np.full_like(values_px, fallback_px)
-    filled: FloatMap = fill_rows(values_px, valid, fallback_px)
+    filled: FloatMap = kernel("matching_rows.fill_rows")(values_px, valid, fallback_px)
     if rows.size == len(values_px):
         return filled
     nearest = np.abs(np.arange(len(values_px))[:, None] - rows[None]).argmin(axis=1)

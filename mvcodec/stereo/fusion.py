@@ -40,12 +40,12 @@ def fuse(
         raise ValueError(f"fuse: found {found}, expected at least one map and one weight for each")
     if len(candidates) == 1:
         return candidates[0]
-    from mvcodec.kernels.matching_rows import fuse_maps
+    from mvcodec.kernels.table import kernel
 
     values = np.stack([candidate.values_px for candidate in candidates])
     valid = np.stack([candidate.valid for candidate in candidates])
     stacked = np.ones_like(values) if weights is None else np.stack(weights)
-    return DisparityMap(*fuse_maps(values, valid, stacked, tolerance_px))
+    return DisparityMap(*kernel("matching_rows.fuse_maps")(values, valid, stacked, tolerance_px))
 
 
 def row_texture(picture: Picture) -> FloatMap:

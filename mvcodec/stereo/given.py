@@ -118,7 +118,7 @@ def whole_map(
     Returns:
         float32 (H, W); valid where a value was measured or lies between such of one surface.
     """
-    from mvcodec.kernels.geodesic import carry
+    from mvcodec.kernels.table import kernel
 
     settings = settings or GivenSettings()
     height, width = picture.shape[:2]
@@ -129,7 +129,7 @@ def whole_map(
         values, known, valid = _enlarged(disparity, (width, height), settings.agree_px)
     if not known.all():
         planes = np.ascontiguousarray(picture.transpose(2, 0, 1), np.float32)
-        carry(planes, np.ascontiguousarray(known), settings.edge_cost, 1.0, values)
+        kernel("geodesic.carry")(planes, np.ascontiguousarray(known), settings.edge_cost, 1.0, values)
     return DisparityMap(values, valid)
 
 

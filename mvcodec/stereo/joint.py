@@ -146,13 +146,13 @@ class Joint:
         levels: int,
     ) -> tuple[FloatMap, Mask]:
         """The disparity of a camera by its own pictures, and what its own costs confirm, where asked."""
-        from mvcodec.kernels import completion, matching_costs
+        from mvcodec.kernels.table import kernel
 
         settings = self.settings
         those = CameraPartners.of(array, camera)
 
         def costs_of(first: int, costs: NDArray[np.uint8]) -> None:
-            matching_costs.joint_costs(
+            kernel("matching_costs.joint_costs")(
                 those.camera,
                 those.partners,
                 views.planes,
@@ -178,7 +178,7 @@ class Joint:
             )
         if asked is None:
             return found.disparity, np.ones(found.disparity.shape, np.bool_)
-        return found.disparity, completion.confirmed(
+        return found.disparity, kernel("completion.confirmed")(
             found.disparity, found.partners, asked, settings.tolerance_px
         )
 
@@ -190,10 +190,10 @@ class Joint:
         range_px: tuple[float, float],
     ) -> Mask:
         """Pixels that other cameras confirm, less specks where no partner sees the whole range."""
-        from mvcodec.kernels import completion
+        from mvcodec.kernels.table import kernel
 
         others = [other for other in neighbours(array, camera) if other in raw]
-        kept: Mask = completion.confirmed(
+        kept: Mask = kernel("completion.confirmed")(
             raw[camera],
             np.stack([raw[other] for other in others]),
             steps(array, camera, others),
@@ -216,19 +216,18 @@ class Joint:
         levels: int,
     ) -> FloatMap:
         """Decide again what nobody confirms, from its surroundings."""
-        from mvcodec.kernels import completion
+        from mvcodec.kernels.completion import NOWHERE
+        from mvcodec.kernels.table import kernel
 
         settings = self.settings
         penalties = settings.completion_penalties
         others = [other for other in neighbours(array, camera) if other in raw]
         own = _parts(raw[camera])
-        behind = np.stack(
-            [np.where(valid[other], _parts(raw[other]), completion.NOWHERE) for other in others]
-        )
+        behind = np.stack([np.where(valid[other], _parts(raw[other]), NOWHERE) for other in others])
         most = MAX_SUM - max(penalties.jump, penalties.least_jump) - penalties.small_step
 
         def costs_of(first: int, costs: NDArray[np.uint8]) -> None:
-            completion.completion_costs(
+            kernel("completion.completion_costs")(
                 own,
                 valid[camera],
                 behind,
@@ -268,10 +267,10 @@ class Joint:
         self, array: CameraArray, camera: Position, picture: Picture, valid: Mask, disparity: FloatMap
     ) -> FloatMap:
         """Replace what no partner can see: scanlines alone leave streaks there."""
-        from mvcodec.kernels import geodesic
+        from mvcodec.kernels.table import kernel
 
         carried = disparity.copy()
-        geodesic.carry(
+        kernel("geodesic.carry")(
             np.ascontiguousarray(picture.transpose(2, 0, 1), np.float32),
             valid,
             self.settings.edge_cost,

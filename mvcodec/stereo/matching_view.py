@@ -55,8 +55,8 @@ def prepare_views(
         cameras: the ones to be matched.
         census_radii: of the census's window, px along rows and along columns.
     """
-    from mvcodec.kernels import census, matching_costs
     from mvcodec.kernels.byte_vectors import LANES
+    from mvcodec.kernels.table import kernel
 
     count, height, width = len(array.real), array.height, array.width
     radius_x, radius_y = census_radii
@@ -80,12 +80,12 @@ def prepare_views(
         found.planes[number][..., inside] = planes
         cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY, found.grey[number])
         bits = np.empty((height, words, width), np.uint8)
-        census.census_rows(found.grey[number], radius_x, radius_y, bits)
+        kernel("census.census_rows")(found.grey[number], radius_x, radius_y, bits)
         found.census[number][..., inside] = bits
         bounds = np.empty((height, 2, 3, width), np.uint8)
         for side, along_rows in enumerate((True, False)):
             if (along_rows, camera) in beside:
-                matching_costs.sampling_interval(planes, along_rows, bounds)
+                kernel("matching_costs.sampling_interval")(planes, along_rows, bounds)
                 found.bounds[side, number][..., inside] = bounds
 
     run_all(prepare, range(count))

@@ -52,7 +52,7 @@ def unseen_border(array: CameraArray, camera: Position, range_px: tuple[float, f
 
 def outside(array: CameraArray, camera: Position, disparity: FloatMap) -> Mask:
     """bool (H, W): where a pixel of this disparity leaves every partner's picture."""
-    from mvcodec.kernels.completion import unseen
+    from mvcodec.kernels.table import kernel
 
-    found: Mask = unseen(disparity, steps(array, camera, partners(array, camera)))
+    found: Mask = kernel("completion.unseen")(disparity, steps(array, camera, partners(array, camera)))
     return found

@@ -89,10 +89,10 @@ def _halved(picture: Picture) -> Picture:
 
 
 def _doubled(small: DisparityMap, picture: Picture, shrunk: Picture) -> DisparityMap:
-    from mvcodec.kernels.enlargement import enlarge
+    from mvcodec.kernels.table import kernel
 
     height, width = picture.shape[:2]
     values_px = np.empty((height, width), np.float32)
-    enlarge(small.values_px * 2, picture, shrunk, AGREEMENT_PX, COLOUR_STEP, values_px)
+    kernel("enlargement.enlarge")(small.values_px * 2, picture, shrunk, AGREEMENT_PX, COLOUR_STEP, values_px)
     valid = small.valid.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
     return DisparityMap(values_px, valid)

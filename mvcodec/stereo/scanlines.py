@@ -137,8 +137,8 @@ def decide(
         low, levels: disparity of level 0, px, and how many levels there are.
         partner_steps: float32 (P, 2), see `semiglobal.take_partner_winners`; None: nothing about partners.
     """
-    from mvcodec.kernels import semiglobal
     from mvcodec.kernels.byte_vectors import LANES
+    from mvcodec.kernels.table import kernel
 
     height, width = grey.shape
     padded = -(-width // LANES) * LANES
@@ -161,13 +161,15 @@ def decide(
         band = costs[: stop - start]
         sums = scratch.array("sums", band.shape, np.uint16)
         along = _along_rows(band, grey[start:stop], table, small, scratch)
-        semiglobal.sum_downwards(band, jumps[:, start:stop], small, *above, along, sums)
+        kernel("semiglobal.sum_downwards")(band, jumps[:, start:stop], small, *above, along, sums)
         # Nothing comes in from below the rows that are looked at.
         ways_up = jumps[:, start : reach + 1].copy()
         ways_up[:, -1] = 0
         below = _beginning(paths, levels, padded, scratch, "below")
         with_below, found = costs[: reach - start], disparity[start:stop]
-        semiglobal.decide_upwards(with_below, ways_up, small, *below, sums, start, low, found, steps, seen)
+        kernel("semiglobal.decide_upwards")(
+            with_below, ways_up, small, *below, sums, start, low, found, steps, seen
+        )
     best = seen[:, 1]
     return Decided(disparity, np.where(best == 65535, np.float32(np.inf), best.astype(np.float32) + low))
 
@@ -209,8 +211,8 @@ def _along_rows(
     scratch: Scratch,
 ) -> NDArray[np.uint8]:
     """Both paths along rows, uint8 (2, R, levels, W'): those of turned bands of LANES rows."""
-    from mvcodec.kernels import semiglobal
     from mvcodec.kernels.byte_vectors import LANES
+    from mvcodec.kernels.table import kernel
 
     height, levels, padded = costs.shape
     width, flat = grey.shape[1], levels * padded
@@ -227,6 +229,6 @@ def _along_rows(
             changes = cv2.absdiff(grey[band, 1:], grey[band, :-1])
             turned_jumps[1:width, :rows] = cv2.LUT(changes, jumps).T
         for forwards, found in zip((True, False), along, strict=True):
-            semiglobal.turned_path(turned, turned_jumps, small, forwards, state, path)
+            kernel("semiglobal.turned_path")(turned, turned_jumps, small, forwards, state, path)
             cv2.transpose(path.reshape(flat, LANES)[:, :rows], found[band].reshape(rows, flat))
     return along

@@ -42,13 +42,13 @@ def refine(
     Returns:
         float32 (H, W), px.
     """
-    from mvcodec.kernels.subpixel_pull import add_pull
+    from mvcodec.kernels.table import kernel
 
     pull, weight = np.zeros_like(disparity), np.zeros_like(disparity)
     for (other_grey, other_disparity), (by_x, by_y) in zip(partners, steps, strict=True):
         along_rows = bool(by_x != 0)
         slope = cv2.Sobel(other_grey, cv2.CV_32F, int(along_rows), int(not along_rows), scale=1 / 8)
-        add_pull(
+        kernel("subpixel_pull.add_pull")(
             disparity,
             grey,
             other_grey,

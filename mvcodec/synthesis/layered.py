@@ -165,14 +165,15 @@ class Layered:
     def _colour(
         self, sources: _Sources, cameras: CellCameras, disparity: FloatMap
     ) -> tuple[Picture, NDArray[np.uint8]]:
-        from mvcodec.kernels import view_colour, view_holes, view_vectors
+        from mvcodec.kernels import view_vectors
+        from mvcodec.kernels.table import kernel
 
         settings = self.settings
         pixels: Picture = np.empty((*disparity.shape, 3), np.uint8)
         seen_by = np.empty(disparity.shape, np.uint8)
         run_in_bands(
             disparity.shape[0],
-            view_colour.blend,
+            kernel("view_colour.blend"),
             cameras.places,
             sources.planes,
             cameras.shifts,
@@ -185,5 +186,5 @@ class Layered:
             seen_by,
         )
         painting = pixels, disparity, seen_by, settings.tolerance_px, settings.hole_reach_px
-        run_in_bands(disparity.shape[0], view_holes.paint_holes, *painting)
+        run_in_bands(disparity.shape[0], kernel("view_holes.paint_holes"), *painting)
         return pixels, seen_by

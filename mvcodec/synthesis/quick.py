@@ -58,7 +58,8 @@ class Quick:
             self._prepared(decoded, viewpoint)
 
     def _render(self, decoded: DecodedSet, viewpoint: Viewpoint, cameras: CellCameras) -> RenderedView:
-        from mvcodec.kernels import view_holes, view_quick
+        from mvcodec.kernels.table import kernel
+        from mvcodec.kernels.view_quick import WEIGHTS
 
         background_px = decoded.disparity_range_px[0]
         disparity = view_disparity(self._maps, NO_LUMA, cameras, BALLOT, background_px)
@@ -66,19 +67,19 @@ class Quick:
         seen_by = np.empty(disparity.shape, np.uint8)
         run_in_bands(
             disparity.shape[0],
-            view_quick.blend,
+            kernel("view_quick.blend"),
             cameras.places,
             self._packed,
             self._maps,
             cameras.shifts,
-            _whole(cameras.weights, view_quick.WEIGHTS),
+            _whole(cameras.weights, WEIGHTS),
             disparity,
             TOLERANCE_PX,
             pixels,
             seen_by,
         )
         painting = pixels, disparity, seen_by, TOLERANCE_PX, HOLE_REACH_PX
-        run_in_bands(disparity.shape[0], view_holes.paint_holes, *painting)
+        run_in_bands(disparity.shape[0], kernel("view_holes.paint_holes"), *painting)
         return RenderedView(viewpoint, pixels, disparity, seen_by)
 
     def _prepared(self, decoded: DecodedSet, viewpoint: Viewpoint) -> CellCameras:

@@ -42,19 +42,19 @@ def view_disparity(
     Returns:
         float32 (H, W), px, known everywhere.
     """
-    from mvcodec.kernels import view_depth
+    from mvcodec.kernels.table import kernel
 
     _, height, width = maps.shape
     moved = np.empty((len(seen.places), height + 2, width + 2), np.float32)
 
     def move(place: int, shift: NDArray[np.float32], out: FloatMap) -> None:
-        view_depth.splat(maps[place], shift[0], shift[1], ballot.reach_px, out)
+        kernel("view_depth.splat")(maps[place], shift[0], shift[1], ballot.reach_px, out)
 
     run_all(move, seen.places, seen.shifts, moved)
     voted = np.empty((height, width), np.float32)
     run_in_bands(
         height,
-        view_depth.vote,
+        kernel("view_depth.vote"),
         moved,
         seen.places,
         maps,
@@ -72,8 +72,8 @@ def view_disparity(
     def clean(first: int, last: int) -> None:
         above, below = max(first - 1, 0), min(last + 1, height)  # the median asks one row beyond the band
         cleaned[first:last] = cv2.medianBlur(voted[above:below], 3)[first - above : last - above]
-        view_depth.restore_thin(voted, ballot.tolerance_px, cleaned, first, last)
-        view_depth.fill_background(cleaned, background_px, first, last)
+        kernel("view_depth.restore_thin")(voted, ballot.tolerance_px, cleaned, first, last)
+        kernel("view_depth.fill_background")(cleaned, background_px, first, last)
 
     run_in_bands(height, clean)
     return cleaned
