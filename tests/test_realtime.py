@@ -57,6 +57,19 @@ def test_balanced_maps_confirm_each_other_whatever_is_asked_for() -> None:
     np.testing.assert_array_equal(some[1, 1].values_px, every[1, 1].values_px)
 
 
+def test_maps_of_small_copies_are_refined_by_the_pictures_themselves() -> None:
+    array = linear_or_grid(2, 2, 120, 80)
+    scene = Planes(array, 4.3, 15.6)
+
+    def median_error(steps: int) -> float:
+        settings = JointSettings(**{**BALANCED, "full_size_steps": steps})
+        found = Realtime(settings, most_px=(0,)).match(array, scene.pictures(), RANGE_PX)[0, 0]
+        off = np.abs(found.values_px - scene.disparity_px((0, 0)))
+        return float(np.median(off[found.valid]))
+
+    assert median_error(2) < median_error(0) / 2
+
+
 def test_what_no_partner_sees_is_not_valid() -> None:
     array = linear_or_grid(1, 2, 100, 60)
     found = Realtime().match(array, Planes(array, 10, 10).pictures(), (4.0, 16.0))[0, 0]

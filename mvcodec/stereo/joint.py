@@ -22,7 +22,7 @@ from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
 from mvcodec.stereo.consistency import drop_speckles, fill_from_farther, median
 from mvcodec.stereo.exposure import camera_gains
 from mvcodec.stereo.joint_settings import JointSettings
-from mvcodec.stereo.matching_view import CameraPartners, MatchingViews, prepare_views
+from mvcodec.stereo.matching_view import CameraPartners, MatchingViews, equal_grey, prepare_views
 from mvcodec.stereo.partners import neighbours, outside, partners, steps, unseen_border
 from mvcodec.stereo.scanlines import MAX_SUM, ScratchPool, decide
 from mvcodec.stereo.subpixel import refine
@@ -116,10 +116,24 @@ class Joint:
             camera: self._smoothed(np.clip(values, *range_px), valid[camera], range_px)
             for camera, values in zip(cameras, completed, strict=True)
         }
-        for _ in range(self.settings.subpixel_steps):
-            refined = run_all(partial(_refined, array, views, maps, valid), cameras)
-            maps = dict(zip(cameras, refined, strict=True))
-        return {camera: np.clip(values, *range_px) for camera, values in maps.items()}, valid
+        greys = {camera: views.grey_of(camera) for camera in cameras}
+        return _subpixel(array, greys, maps, valid, range_px, self.settings.subpixel_steps), valid
+
+    def refined(
+        self,
+        array: CameraArray,
+        pictures: Mapping[Position, Picture],
+        maps: Mapping[Position, DisparityMap],
+        range_px: tuple[float, float],
+    ) -> dict[Position, DisparityMap]:
+        """Maps that small copies of these pictures gave last, sub-pixel by the pictures themselves."""
+        if not self.settings.full_size_steps or self._gains.keys() != set(array.real):
+            return dict(maps)
+        greys = {camera: equal_grey(pictures[camera], self._gains[camera]) for camera in maps}
+        values = {camera: found.values_px for camera, found in maps.items()}
+        valid = {camera: found.valid for camera, found in maps.items()}
+        moved = _subpixel(array, greys, values, valid, range_px, self.settings.full_size_steps)
+        return {camera: DisparityMap(moved[camera], valid[camera]) for camera in maps}
 
     def _matched(
         self,
@@ -280,9 +294,25 @@ class Joint:
         return np.where(outside(array, camera, carried) & ~valid, carried, disparity)
 
 
+def _subpixel(
+    array: CameraArray,
+    greys: Mapping[Position, NDArray[np.uint8]],
+    maps: dict[Position, FloatMap],
+    valid: Mapping[Position, Mask],
+    range_px: tuple[float, float],
+    count: int,
+) -> dict[Position, FloatMap]:
+    """So many steps of refinement of all maps, each from where the last one left them."""
+    smooth = {camera: grey.astype(np.float32) for camera, grey in greys.items()}
+    for _ in range(count):
+        moved = run_all(partial(_refined, array, smooth, maps, valid), maps)
+        maps = dict(zip(maps, moved, strict=True))
+    return {camera: np.clip(values, *range_px) for camera, values in maps.items()}
+
+
 def _refined(
     array: CameraArray,
-    views: MatchingViews,
+    greys: Mapping[Position, FloatMap],
     maps: Mapping[Position, FloatMap],
     valid: Mapping[Position, Mask],
     camera: Position,
@@ -290,11 +320,11 @@ def _refined(
     beside = [partner for partner in partners(array, camera) if partner in maps]
     if not beside:
         return maps[camera]
-    said = [(views.grey_of(partner).astype(np.float32), maps[partner]) for partner in beside]
+    said = [(greys[partner], maps[partner]) for partner in beside]
     return refine(
         maps[camera],
         valid[camera],
-        views.grey_of(camera).astype(np.float32),
+        greys[camera],
         said,
         steps(array, camera, beside),
     )

@@ -64,6 +64,9 @@ class JointSettings:
     )
     thin_area_px: int = setting(16, "and that have at least this many pixels", low=0, high=1e6)
     subpixel_steps: int = setting(3, "steps of sub-pixel refinement", low=0, high=20)
+    full_size_steps: int = setting(
+        0, "steps of it after maps of small copies were brought back", low=0, high=20
+    )
 
     def __post_init__(self) -> None:
         check_settings(self, "JointSettings.")
@@ -93,7 +96,7 @@ SMALL_CENSUS: dict[str, Any] = {
     "jump": 85,
 }
 
-BALANCED: dict[str, Any] = {**SMALL_CENSUS, "subpixel_steps": 2}
+BALANCED: dict[str, Any] = {**SMALL_CENSUS, "subpixel_steps": 0, "full_size_steps": 2}
 
 """Of what is matched in small copies (`mvcodec.stereo.realtime`)."""
 

@@ -41,6 +41,17 @@ class MatchingViews:
         return np.asarray(self.grey[self.cameras.index(camera)])
 
 
+def _evened(picture: Picture, gains: NDArray[np.float32]) -> Picture:
+    if np.all(gains == 1):
+        return picture
+    return np.asarray(np.rint(picture * gains).clip(0, 255), np.uint8)
+
+
+def equal_grey(picture: Picture, gains: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Luma of a picture whose R, G and B are multiplied by their gains, uint8 (H, W)."""
+    return np.asarray(cv2.cvtColor(_evened(picture, gains), cv2.COLOR_RGB2GRAY), np.uint8)
+
+
 def prepare_views(
     array: CameraArray,
     pictures: Mapping[Position, Picture],
@@ -73,9 +84,7 @@ def prepare_views(
 
     def prepare(number: int) -> None:
         camera = array.real[number]
-        picture = pictures[camera]
-        if np.any(gains[camera] != 1):
-            picture = np.asarray(np.rint(picture * gains[camera]).clip(0, 255), np.uint8)
+        picture = _evened(pictures[camera], gains[camera])
         planes = np.ascontiguousarray(picture.transpose(0, 2, 1))
         found.planes[number][..., inside] = planes
         cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY, found.grey[number])

@@ -35,7 +35,8 @@ class Realtime:
         """Match at half the size where pictures have more than most_px[0] pixels, and so on."""
         chosen = settings or JointSettings(**REALTIME)
         self._joint = Joint(chosen)
-        self._unshrunk = Joint(replace(chosen, **SMALL_PICTURES))
+        steps = max(chosen.subpixel_steps, chosen.full_size_steps)
+        self._unshrunk = Joint(replace(chosen, **SMALL_PICTURES, subpixel_steps=steps))
         self._most_px = most_px
 
     def match(
@@ -60,6 +61,7 @@ class Realtime:
             maps = self._unshrunk.maps_of(array, pictures, range_px, matched, fresh)
         else:
             maps = self._match_halved(array, pictures, range_px, matched, fresh, halvings)
+            maps = self._joint.refined(array, pictures, maps, range_px)
         return {camera: maps[camera] for camera in cameras}
 
     def _match_halved(
