@@ -53,9 +53,9 @@ def encode_all(made: Material, speed: str) -> None:
             encoder.push(frame_set)
 
 
-def matching_rows() -> Iterator[Row]:
+def matching_rows(size: tuple[int, int] = (640, 480)) -> Iterator[Row]:
     """The maps of a frame set by each speed's matcher, over one StereoSGBM call."""
-    made = material(640, 480)
+    made = material(*size)
     cv2.setNumThreads(1)
     for speed, goals in MATCHING.items():
         matcher = make_matcher(SPEEDS[speed].matcher)

@@ -115,6 +115,20 @@ def test_hint_bounds_and_is_narrowed() -> None:
     assert estimate_range(array, frames, (10.5, 29.5)) == (10.5, 29.5)
 
 
+@pytest.mark.parametrize(
+    ("hint", "low", "high"), [((8.0, 24.0), 8, 30), ((14.0, 34.0), 10, 34), ((13.0, 27.0), 10, 30)], ids=str
+)
+def test_a_hint_that_is_too_narrow_is_widened_and_that_is_told(
+    hint: tuple[float, float], low: int, high: int
+) -> None:
+    array = linear_or_grid(1, 2, 320, 200, name="mine")
+    frames = [Planes(array, 10, 30).frame_set()]
+    with pytest.warns(MvCodecWarning, match=r"mine: the pictures show disparities of .*; widened to"):
+        found = estimate_range(array, frames, hint)
+    assert low - 4 <= found[0] <= low
+    assert high <= found[1] <= high + 6
+
+
 @pytest.mark.parametrize("level", [0, 5, 255])
 @pytest.mark.parametrize("noise", [0.0, 2.0])
 @pytest.mark.parametrize("grid", [(1, 2), (2, 2)], ids=str)

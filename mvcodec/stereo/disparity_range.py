@@ -49,6 +49,8 @@ _REPEATED_CLUSTER = 0.3
 _NEAR_TAIL, _FAR_TAIL = 0.0005, 0.001
 _NEAR_MARGIN, _FAR_MARGIN = 0.1, 0.02
 _LEAST_MARGIN_PX = 1.0
+_BESIDE_HINT = 0.5
+"""Of a hint's extent, how far beyond it is looked: further, chance would find more than scenes hold."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +84,8 @@ def estimate_range(
         array: the geometry.
         frame_sets: some of the input (up to three are used, spread evenly), with every real
             camera's picture.
-        hint_px: (lo, hi) between neighbouring real cameras that the result stays inside.
+        hint_px: (lo, hi) between neighbouring real cameras that the result stays inside, unless the pictures
+            show more: then it is widened, and a MvCodecWarning says so.
 
     Returns:
         (lo, hi), px, lo < hi; lo may be negative. Where next to nothing matches, a MvCodecWarning
@@ -98,7 +101,12 @@ def estimate_range(
     jobs = _jobs(array, frame_sets)
     if not jobs:
         return hint_px or FALLBACK_RANGE_PX
-    found = _search(jobs, COARSE_WIDTH, hint_px)
+    # A hint that is too narrow is to be seen as such.
+    around = hint_px and (
+        hint_px[0] - _BESIDE_HINT * (hint_px[1] - hint_px[0]),
+        hint_px[1] + _BESIDE_HINT * (hint_px[1] - hint_px[0]),
+    )
+    found = _search(jobs, COARSE_WIDTH, around)
     coarse = _union(found)
     share = float(np.mean([item.share for item in found]))
     if coarse is None or share < MIN_MATCHED_SHARE:
@@ -114,8 +122,10 @@ def estimate_range(
     extent = coarse[1] - coarse[0]
     slack = max(4.0, array.width / 64)
     span = coarse[0] - 0.1 * extent - slack, coarse[1] + 0.3 * extent + slack
-    fine = _union(_search(jobs, FINE_WIDTH, _inside(span, hint_px)))
+    fine = _union(_search(jobs, FINE_WIDTH, _inside(span, around)))
     low, high = fine or coarse
+    if hint_px is not None:
+        hint_px = _widened(hint_px, (low, high), array.name)
     extent = high - low
     low -= _LEAST_MARGIN_PX + _FAR_MARGIN * extent
     high += _LEAST_MARGIN_PX + _NEAR_MARGIN * extent
@@ -142,6 +152,27 @@ def _inside(range_px: tuple[float, float], hint_px: tuple[float, float] | None) 
         return range_px
     low, high = max(range_px[0], hint_px[0]), min(range_px[1], hint_px[1])
     return (low, high) if low < high else hint_px
+
+
+def _widened(hint_px: tuple[float, float], seen_px: tuple[float, float], name: str) -> tuple[float, float]:
+    """The hint, or further where the pictures show more than that; which is told."""
+    low, high = seen_px
+    beyond = low < hint_px[0] - _LEAST_MARGIN_PX, high > hint_px[1] + _LEAST_MARGIN_PX
+    if not any(beyond):
+        return hint_px
+    margin = _LEAST_MARGIN_PX
+    wider = (
+        float(math.floor(low - margin)) if beyond[0] else hint_px[0],
+        float(math.ceil(high + margin + _NEAR_MARGIN * (high - low))) if beyond[1] else hint_px[1],
+    )
+    warnings.warn(
+        f"{name or 'input'}: the pictures show disparities of {low:.0f}..{high:.0f} px, beyond the stated"
+        f" {hint_px[0]:g}..{hint_px[1]:g} px; widened to {wider[0]:g}..{wider[1]:g} px"
+        " (state disparity_per_step_px anew, or leave it out)",
+        MvCodecWarning,
+        stacklevel=3,
+    )
+    return wider
 
 
 def _union(found: Sequence[_Found]) -> tuple[float, float] | None:
