@@ -264,7 +264,9 @@ def test_beyond_loopback_it_warns(file: Path, capfd: pytest.CaptureFixture[str])
 
 
 def test_without_the_extra_it_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch, file: Path) -> None:
-    monkeypatch.setattr(play, "find_spec", lambda name: None if name == "uvicorn" else find_spec(name))
+    monkeypatch.setattr(
+        "importlib.util.find_spec", lambda name: None if name == "uvicorn" else find_spec(name)
+    )
     parser = argparse.ArgumentParser()
     play.add_arguments(parser)
     with pytest.raises(
