@@ -1,4 +1,4 @@
-"""Context managers that close themselves, however the block ends."""
+"""Context managers that close themselves, or give up where the block ends with an error."""
 
 from __future__ import annotations
 
@@ -20,3 +20,19 @@ class Closing:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+class Completing(Closing):
+    """What `close` completes; a `with` block that ends with an error gives it up."""
+
+    def abort(self) -> None:
+        """Give up; each class says what stays."""
+        raise NotImplementedError
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self.abort()

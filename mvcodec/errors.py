@@ -6,6 +6,7 @@ A message names the thing, the value found and what was expected. The command li
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 
@@ -97,6 +98,15 @@ class MissingExtra(MvCodecError):
     def __init__(self, package: str, extra: str) -> None:
         wanted = " ".join(f"'{requirement}'" for requirement in _packages_of(extra) or (package,))
         super().__init__(f"{package} is not installed; install it with: pip install {wanted}")
+
+
+def require_packages(packages: Iterable[str], extra: str) -> None:
+    """Raise MissingExtra where a package of an extra is not installed."""
+    from importlib.util import find_spec
+
+    for package in packages:
+        if find_spec(package) is None:
+            raise MissingExtra(package, extra)
 
 
 def _packages_of(extra: str) -> list[str]:

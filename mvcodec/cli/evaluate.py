@@ -7,7 +7,6 @@ import re
 import warnings
 from collections.abc import Callable
 from contextlib import ExitStack
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,7 @@ from mvcodec.cli.paths import check_folder_target
 from mvcodec.cli.progress import progress
 from mvcodec.cluster.connection import connected
 from mvcodec.cluster.places import Place
-from mvcodec.errors import MissingExtra, MvCodecWarning, OutputError
+from mvcodec.errors import MvCodecWarning, OutputError, require_packages
 from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codecs import ANCHOR_CODECS, CODECS
 from mvcodec.workers import thread_count
@@ -78,9 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Measure what is not measured yet, and write the report."""
-    for package in PACKAGES:
-        if find_spec(package) is None:
-            raise MissingExtra(package, EXTRA)
+    require_packages(PACKAGES, EXTRA)
     output: Path = arguments.output
     if output.exists() and not output.is_dir():
         raise OutputError(output, "it is a file; a report is a folder")

@@ -8,13 +8,12 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from importlib.util import find_spec
 
 from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_matcher, add_synthesizer, check_matcher
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.container.reader import McapReader
-from mvcodec.errors import MissingExtra, SettingError
+from mvcodec.errors import SettingError, require_packages
 from mvcodec.synthesis.synthesizers import make_synthesizer, quicker_synthesizer
 
 EXTRA = "play"
@@ -46,9 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Serve the page until Ctrl-C."""
-    for package in PACKAGES:
-        if find_spec(package) is None:
-            raise MissingExtra(package, EXTRA)
+    require_packages(PACKAGES, EXTRA)
     if arguments.renderer == "web" and arguments.original is not None:
         raise SettingError("original", arguments.original, "`renderer` server with it")
     if _renderer(arguments) == "web":

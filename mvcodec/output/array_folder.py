@@ -6,10 +6,10 @@ import json
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from mvcodec.array import Calibration, CameraArray, Position
+from mvcodec.closing import Completing
 from mvcodec.errors import OutputError, SettingError, StreamClosed
 from mvcodec.frames import FloatMap, Picture
 from mvcodec.output.atomic import write_bytes
@@ -78,7 +78,7 @@ class ArrayFacts:
         return document
 
 
-class ArrayFolderWriter:
+class ArrayFolderWriter(Completing):
     """Writes an array folder, frame set by frame set.
 
     An existing folder is written into. Its old `array.json` goes at the first push, so that a run
@@ -183,17 +183,6 @@ class ArrayFolderWriter:
     def abort(self) -> None:
         """Stop without an `array.json`; pictures already written stay."""
         self._closed = True
-
-    def __enter__(self) -> ArrayFolderWriter:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is None:
-            self.close()
-        else:
-            self.abort()
 
 
 def write_manifest(folder: Path, facts: ArrayFacts, files: Mapping[str, Any]) -> None:

@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from mvcodec.array import Calibration, CameraArray, Position, Viewpoint
-from mvcodec.closing import Closing
+from mvcodec.closing import Closing, Completing
 from mvcodec.errors import OutputError, SettingError, StreamClosed
 from mvcodec.frames import Picture
 from mvcodec.output.array_folder import ArrayFacts, ArrayFolderWriter
@@ -161,7 +161,7 @@ class VideoForm:
         self._resources.__exit__(kind, error, trace)
 
 
-class MosaicForm:
+class MosaicForm(Completing):
     """All views side by side: an MP4 file, or a PNG of the first frame.
 
     Raises:
@@ -210,15 +210,9 @@ class MosaicForm:
         if self._video is not None:
             self._video.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is None:
-            self.close()
-        elif self._video is not None:
+    def abort(self) -> None:
+        """Drop a video; a PNG is complete already."""
+        if self._video is not None:
             self._video.abort()
 
 

@@ -7,7 +7,6 @@ import warnings
 from contextlib import ExitStack
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
 
 import av
 import av.error
@@ -24,6 +23,7 @@ from av.video.reformatter import (
 )
 from av.video.stream import VideoStream
 
+from mvcodec.closing import Completing
 from mvcodec.errors import MvCodecWarning, OutputError, StreamClosed
 from mvcodec.frames import Picture
 from mvcodec.output.atomic import replacing
@@ -46,7 +46,7 @@ _MAX_STEP_TICKS = 1 << 28
 """From picture to picture, as FFmpeg can say it in MP4; longer pauses are shortened to that."""
 
 
-class Mp4Writer:
+class Mp4Writer(Completing):
     """Writes pictures of one view as H.264, yuv420p, BT.709 limited range (tagged), in MP4.
 
     Pictures are shown from their own times on, the first at 0, or at a constant rate where they have none.
@@ -167,17 +167,6 @@ class Mp4Writer:
             self._closed = True
             error = OutputError(self.path, "given up")
             self._resources.__exit__(type(error), error, None)
-
-    def __enter__(self) -> Mp4Writer:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is None:
-            self.close()
-        else:
-            self.abort()
 
 
 def steady_fraction(fps: float) -> Fraction:

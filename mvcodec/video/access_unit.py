@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from mvcodec.video.bits import BitReader
+
+_EXTENDED_SAR = 255
+
 
 @dataclass(frozen=True, slots=True)
 class Colour:
@@ -91,3 +95,26 @@ class UnitWords:
     keyframe: str
     parameters: str
     profile: str
+
+
+def usability_colour(bits: BitReader) -> Colour:
+    """The colour that video usability information begins with, the same in H.264 (E.1.1) and H.265 (E.2.1).
+
+    Args:
+        bits: at its first field; read up to those about time and fields.
+    """
+    if bits.flag() and bits.u(8) == _EXTENDED_SAR:
+        bits.u(32)
+    if bits.flag():
+        bits.flag()
+    colour = Colour(False, None, None, None)
+    if bits.flag():
+        bits.u(3)
+        full = bits.flag()
+        described = bits.flag()
+        primaries, transfer, matrix = (bits.u(8) for _ in range(3)) if described else (None, None, None)
+        colour = Colour(full, primaries, transfer, matrix)
+    if bits.flag():  # chroma location
+        bits.ue()
+        bits.ue()
+    return colour

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mvcodec.video.access_unit import Colour, Sequence, UnitFacts
+from mvcodec.video.access_unit import Colour, Sequence, UnitFacts, usability_colour
 from mvcodec.video.annexb import (
     IDR_SLICE,
     PPS,
@@ -21,7 +21,6 @@ from mvcodec.video.sei import recovers_at_once
 _HIGH_PROFILES = frozenset({100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135})
 """The profile_idc whose parameter sets have fields of chroma and bit depth (7.3.2.1.1)."""
 
-_EXTENDED_SAR = 255
 _HEAD_BYTES = 64
 """More than enough of a slice for the first fields of its header."""
 
@@ -303,20 +302,7 @@ def _picture_order(bits: BitReader) -> int:
 
 def _usability(bits: BitReader) -> tuple[Colour, int | None]:
     """Video usability information (annex E.1.1): colour, and the pictures that may be reordered."""
-    if bits.flag() and bits.u(8) == _EXTENDED_SAR:
-        bits.u(32)
-    if bits.flag():
-        bits.flag()
-    colour = Colour(False, None, None, None)
-    if bits.flag():
-        bits.u(3)
-        full = bits.flag()
-        described = bits.flag()
-        primaries, transfer, matrix = (bits.u(8) for _ in range(3)) if described else (None, None, None)
-        colour = Colour(full, primaries, transfer, matrix)
-    if bits.flag():  # chroma location
-        bits.ue()
-        bits.ue()
+    colour = usability_colour(bits)
     if bits.flag():  # timing
         bits.u(65)
     models = 0

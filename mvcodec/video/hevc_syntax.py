@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mvcodec.video.access_unit import Colour, Sequence, UnitFacts
+from mvcodec.video.access_unit import Colour, Sequence, UnitFacts, usability_colour
 from mvcodec.video.annexb import begins_with_start_code, nal_units
 from mvcodec.video.bits import BitReader, NalError, payload
 
@@ -31,7 +31,6 @@ MAX_LONG_TERM = 32
 _MAIN = 1
 """general_profile_idc."""
 
-_EXTENDED_SAR = 255
 _PIXEL_SHAPE_EXTENDED = 3
 
 ReferenceSet = tuple[tuple[int, bool], ...]
@@ -256,19 +255,7 @@ def _reference_sets(bits: BitReader) -> tuple[ReferenceSet, ...]:
 
 def _usability(bits: BitReader) -> tuple[Colour, bool]:
     """Video usability information (annex E.2.1): colour, and whether pictures are fields."""
-    if bits.flag() and bits.u(8) == _EXTENDED_SAR:
-        bits.u(32)
-    if bits.flag():
-        bits.flag()
-    colour = Colour(False, None, None, None)
-    if bits.flag():
-        bits.u(3)
-        full = bits.flag()
-        described = bits.flag()
-        colour = Colour(full, *((bits.u(8), bits.u(8), bits.u(8)) if described else (None, None, None)))
-    if bits.flag():  # chroma location
-        bits.ue()
-        bits.ue()
+    colour = usability_colour(bits)
     bits.flag()  # neutral_chroma_indication_flag
     return colour, bits.flag()
 
