@@ -19,7 +19,6 @@ from command_line import COMMAND, fails, mvcodec, succeeds
 from small_arrays import write_array
 
 from mvcodec.capture.picture_files import read_picture
-from mvcodec.cli import evaluate
 from mvcodec.cli.main import main
 from mvcodec.container import read_info
 
@@ -352,7 +351,7 @@ def test_a_file_is_no_report(array: Path, tmp_path: Path) -> None:
 def test_what_is_not_installed_is_named_with_its_extra(
     array: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(evaluate, "find_spec", lambda _: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     assert main(["evaluate", str(array), "--output", str(tmp_path / "r")]) == 1
     assert "pip install 'bjontegaard>=" in capsys.readouterr().err
 
