@@ -9,6 +9,7 @@ from pathlib import Path
 
 import av
 import pytest
+from command_line import mvcodec
 from orientation_tags import turn_upside_down
 from timed_videos import SIZE, number_of, numbered, write_video
 
@@ -16,6 +17,7 @@ from mvcodec.capture import open_input
 from mvcodec.capture.source import ArraySource
 from mvcodec.capture.timing import Timing
 from mvcodec.capture.video_input import VideoView
+from mvcodec.container import read_info
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
 
 
@@ -241,3 +243,35 @@ def test_names_are_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: 
     monkeypatch.chdir(tmp_path)
     for path in (Path(name), tmp_path / name):
         assert numbers(opened(path)[0]) == [[0], [1]]
+
+
+def test_a_short_virtual_view_costs_nothing_where_it_is_not_wanted(tmp_path: Path) -> None:
+    """The middle one of three views is no real camera: it begins late, ends early and has gaps."""
+    for col, shown in enumerate((range(12), (3, 4, 6, 7), range(12))):
+        write_video(tmp_path / f"{col}.mkv", shown, at_30(list(shown)), col=col)
+    paths = [tmp_path / f"{col}.mkv" for col in range(3)]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        source = open_input(paths, grid=(1, 3), originals=False)
+    assert numbers(source) == [[n, n] for n in range(12)]
+    assert not caught
+    with pytest.raises(SettingError, match="expected a real camera"):
+        source.frame_sets(views=[(0, 1)])
+    with pytest.warns(MvCodecWarning, match="common time"):
+        source = open_input(paths, grid=(1, 3))
+    assert [item.time_ns for item in source.frame_sets(views=[(0, 1)])] == [
+        round(n * 1e9 / 30) for n in (3, 4, 6, 7)
+    ]
+
+
+def test_the_command_codes_the_span_of_the_real_cameras(tmp_path: Path) -> None:
+    for col, count in enumerate((5, 2, 5)):
+        write_video(tmp_path / f"{col}.mp4", range(count), col=col)
+    (tmp_path / "array.json").write_text('{"rows": 1, "cols": 3, "pattern": "{col}.mp4"}')
+    choices: tuple[tuple[tuple[str, ...], int], ...] = (((), 5), (("--enhance", "40"), 2))
+    for options, count in choices:
+        out = tmp_path / f"{count}.mcap"
+        ran = mvcodec("encode", tmp_path, out, "--matcher", "sgbm", "--json", *options)
+        assert ran.returncode == 0, ran.stderr
+        assert read_info(out).frames == count
+        assert ("common time" in ran.stderr) == (count == 2)

@@ -11,7 +11,7 @@ from mvcodec.capture.bit_depth import BitDepth
 from mvcodec.capture.manifest import DEFAULT_FPS, MANIFEST_NAME, Manifest, ViewFiles, read_manifest
 from mvcodec.capture.named_files import open_files, tell_notes
 from mvcodec.capture.reading import Reading
-from mvcodec.capture.selection import select_real
+from mvcodec.capture.selection import RealAxes, select_real
 from mvcodec.capture.shared_clock import StatedTimes, common_times
 from mvcodec.capture.source import ArraySource
 from mvcodec.capture.timing import Timing
@@ -33,6 +33,7 @@ def open_input(
     real: str = "corners",
     timing: Timing | None = None,
     reading: Reading | None = None,
+    originals: bool = True,
 ) -> ArraySource:
     """Open an input; of pictures the headers are read, of videos the packets and the first frame.
 
@@ -44,6 +45,8 @@ def open_input(
         real: which cameras are real: ``corners``, ``all``, ``every:K`` or ``R,R..xC,C..``.
         timing: what is known better than the files say.
         reading: how pictures are read, and what happens to unreadable ones.
+        originals: virtual views' own pictures are wanted too; if not, real cameras alone decide when
+            there are frame sets, and nothing else can be read.
 
     Raises:
         SettingError: `grid`, `real` or `timing` doesn't fit the input.
@@ -58,12 +61,17 @@ def open_input(
         if not path.exists():
             raise InputError(path, "nothing there", "an array folder or a video file")
     if len(given) == 1 and (given[0].is_dir() or given[0].suffix.lower() == ".json"):
-        return _open_folder(given[0], grid, real, timing, reading)
-    return _open_videos(given, grid, real, timing, reading)
+        return _open_folder(given[0], grid, real, timing, reading, originals)
+    return _open_videos(given, grid, real, timing, reading, originals)
 
 
 def _open_folder(
-    path: Path, grid: tuple[int, int] | None, real: str, timing: Timing, reading: Reading
+    path: Path,
+    grid: tuple[int, int] | None,
+    real: str,
+    timing: Timing,
+    reading: Reading,
+    originals: bool,
 ) -> ViewArray:
     manifest = read_manifest(_find_manifest(path))
     if grid not in (None, (manifest.rows, manifest.cols)):
@@ -75,8 +83,10 @@ def _open_folder(
     depth = BitDepth(str(path), reading.bits)
     views = _open_views(manifest, depth)
     stated = StatedTimes(manifest.path, manifest.fps, manifest.times_ns, manifest.first_frame)
-    fps, pairing = common_times(str(path), views, stated, timing, DEFAULT_FPS)
-    array = _folder_array(manifest, views[0, 0].size, fps, real)
+    axes = select_real(real, manifest.rows, manifest.cols)
+    deciding = views if originals else _crossings(axes)
+    fps, pairing = common_times(str(path), views, stated, timing, DEFAULT_FPS, deciding)
+    array = _folder_array(manifest, views[0, 0].size, fps, axes)
     for position, files in manifest.truth.items():
         count = views[position].count
         if len(files.names) not in (1, count):
@@ -108,8 +118,7 @@ def _find_manifest(path: Path) -> Path:
     raise InputError(path, "an empty folder" if is_empty else f"no {MANIFEST_NAME}", EXPECTED)
 
 
-def _folder_array(manifest: Manifest, size: tuple[int, int], fps: float, real: str) -> CameraArray:
-    real_rows, real_cols = select_real(real, manifest.rows, manifest.cols)
+def _folder_array(manifest: Manifest, size: tuple[int, int], fps: float, real: RealAxes) -> CameraArray:
     try:
         return CameraArray(
             rows=manifest.rows,
@@ -117,8 +126,8 @@ def _folder_array(manifest: Manifest, size: tuple[int, int], fps: float, real: s
             width=size[0],
             height=size[1],
             fps=fps,
-            real_rows=real_rows,
-            real_cols=real_cols,
+            real_rows=real[0],
+            real_cols=real[1],
             calibration=manifest.calibration or Calibration.nominal(*size),
             rho=manifest.rho,
             disparity_per_step_px=manifest.disparity_per_step_px,
@@ -129,15 +138,21 @@ def _folder_array(manifest: Manifest, size: tuple[int, int], fps: float, real: s
 
 
 def _open_videos(
-    paths: Sequence[Path], grid: tuple[int, int] | None, real: str, timing: Timing, reading: Reading
+    paths: Sequence[Path],
+    grid: tuple[int, int] | None,
+    real: str,
+    timing: Timing,
+    reading: Reading,
+    originals: bool,
 ) -> ViewArray:
     name = str(paths[0]) if len(paths) == 1 else f"{paths[0]} ... {paths[-1]}"
     (rows, cols), views = open_files(paths, name, grid, reading)
     tell_notes(views)
     first = views[0, 0]
     default_fps = None if any(view.times_ns for view in views.values()) else DEFAULT_FPS
-    fps, pairing = common_times(name, views, StatedTimes(), timing, default_fps)
-    real_rows, real_cols = select_real(real, rows, cols)
+    axes = select_real(real, rows, cols)
+    deciding = views if originals else _crossings(axes)
+    fps, pairing = common_times(name, views, StatedTimes(), timing, default_fps, deciding)
     width, height = first.size
     calibration = Calibration.nominal(width, height)
     array = CameraArray(
@@ -146,8 +161,7 @@ def _open_videos(
         width,
         height,
         fps,
-        real_rows,
-        real_cols,
+        *axes,
         calibration,
         name=first.path.resolve().parent.name,
     )
@@ -162,6 +176,10 @@ def _open_views(manifest: Manifest, depth: BitDepth) -> dict[Position, ViewReade
     check_sizes(views)
     tell_notes(views)
     return views
+
+
+def _crossings(axes: RealAxes) -> set[Position]:
+    return {(row, col) for row in axes[0] for col in axes[1]}
 
 
 def _grid_text(grid: tuple[int, int] | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -42,6 +42,7 @@ def common_times(
     stated: StatedTimes,
     timing: Timing,
     default_fps: float | None,
+    deciding: Collection[Position],
 ) -> tuple[float, Pairing]:
     """Frame rate, and the pictures that belong together; what is left out or guessed is a warning.
 
@@ -51,15 +52,18 @@ def common_times(
     Args:
         name: the input, for messages.
         default_fps: of picture files whose rate nobody states; None: that is an error.
+        deciding: the views whose times count; the others have no place in the pairing.
 
     Raises:
         SettingError: an offset for a camera that is not there.
         InputError: no frame rate, or no picture of all cameras at one time.
     """
+    offsets = _offsets_ns(views, timing)
     given = _checked(stated, views)
+    views = {view: reader for view, reader in views.items() if view in deciding}
+    given = {view: times for view, times in given.items() if view in deciding}
     known = {view: stamps for view, reader in views.items() if (stamps := given.get(view) or reader.times_ns)}
     fps = timing.fps or _rate(name, views, known, given, stated, default_fps)
-    offsets = _offsets_ns(views, timing)
     times: dict[Position, Sequence[int]] = {}
     for view, reader in views.items():
         own = known.get(view)

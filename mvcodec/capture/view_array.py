@@ -103,7 +103,7 @@ class ViewArray:
         name: the input as the user wrote it.
         array: geometry and real cameras.
         views: a reader for every grid position, all of the same size (see `check_sizes`).
-        pairing: which of their pictures belong together.
+        pairing: which of their pictures belong together; views that it leaves out cannot be read.
         on_unreadable: told of a picture that cannot be read, whose frame set is left out; None: it is raised.
         truth: ground truth by view.
         given: disparity or depth of the views' pictures; None: there is none.
@@ -137,8 +137,10 @@ class ViewArray:
         numbers = resolve_frames(frames, self.frame_count, self.name)
         chosen = self.array.real if views is None else tuple(views)
         for position in chosen:
-            if position not in self._views:
+            if position not in self._pairing.numbers:
                 grid = f"a view of the {self.array.rows}x{self.array.cols} grid"
+                if position in self._views:
+                    grid = "a real camera: the input was opened without `originals`"
                 raise SettingError("view", f"{position[0]},{position[1]}", grid)
         return self._read(numbers, chosen)
 

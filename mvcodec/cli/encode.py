@@ -209,6 +209,9 @@ def _open(arguments: argparse.Namespace) -> ArraySource:
             real=arguments.real,
             timing=timing_of(arguments),
             reading=reading_of(arguments),
+            originals=any(
+                option is not None for option in (arguments.enhance, arguments.target_psnr, arguments.rig)
+            ),
         )
     for option, found, default in (("--grid", arguments.grid, None), ("--real", arguments.real, "corners")):
         if found != default:
