@@ -258,6 +258,19 @@ def test_deep_pixels_keep_their_levels(encoding: str, bits: int) -> None:
     assert ("taken as" in read.told) == (bits < 16)
 
 
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
+def test_a_recording_that_is_cut_off_early_is_called_so(compression: CompressionType) -> None:
+    """Its only chunk breaks off, at several places."""
+    whole = written(raws(range(4)), compression)
+    told = set()
+    for size in (10, 60, 200, 1000, 2000):
+        with pytest.raises(InputError) as error:
+            Read(whole[:size])
+        assert "cut off" in str(error.value), (size, error.value)
+        told.add(error.value.found)
+    assert f"no topic {min(TOPICS)} before it is cut off" in told
+
+
 def test_an_unreadable_picture_costs_its_frame_set_where_that_is_wanted() -> None:
     messages = raws(range(8))
     messages[9][1].data = messages[9][1].data[:100]

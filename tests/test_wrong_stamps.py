@@ -14,6 +14,7 @@ from timed_videos import number_of
 
 from mvcodec.capture.recording import Recording
 from mvcodec.capture.recording_settings import RecordingSettings
+from mvcodec.errors import MvCodecWarning
 
 YEARS_NS = 10 * 365 * 86_400 * 10**9
 
@@ -86,6 +87,26 @@ def test_log_times_that_mean_nothing_change_nothing() -> None:
     numbers, times, _ = read(taken)
     assert numbers == list(range(8))
     assert times == [at(n * 300) for n in range(8)]
+
+
+@pytest.mark.parametrize(("fps", "rate"), [(None, 20.0), (25.0, 25.0)])
+def test_recordings_that_were_written_at_once_have_the_rate_of_their_stamps(
+    fps: float | None, rate: float
+) -> None:
+    taken = [(TOPICS[c], raw(n, c), START_NS, START_NS + n * 50_000_000) for n in range(4) for c in (0, 1)]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        recording = Recording(io.BytesIO(written(taken)), "rec", RecordingSettings((TOPICS,), fps=fps))
+    assert recording.array.fps == rate
+    told = "\n".join(str(warning.message) for warning in caught)
+    assert ("written down at one time: 20 fps, by the first stamps" in told) == (fps is None)
+    assert [item.time_ns for item in recording.frame_sets()] == [START_NS + n * 50_000_000 for n in range(4)]
+
+
+def test_recordings_without_any_times_say_what_is_guessed() -> None:
+    taken = [(TOPICS[c], raw(n, c), START_NS, 0) for n in range(3) for c in (0, 1)]
+    with pytest.warns(MvCodecWarning, match="at one time: 1 fps is taken"):
+        Recording(io.BytesIO(written(taken)), "rec", RecordingSettings((TOPICS,)))
 
 
 def test_stamps_that_stand_still_are_told() -> None:

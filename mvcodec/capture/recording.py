@@ -181,13 +181,13 @@ class Recording:
         first = []
         for found in self._sets:
             first.append(found)
-            if self._settings.fps is not None or self._reader.indexed or len(first) == 2:
+            known = self._reader.indexed and not self._reader.written_at_once
+            if self._settings.fps is not None or known or len(first) == 2:
                 break
         if not first:
             apart = self._clock.check_apart(list(self._topics), self._step_ns())
-            raise InputError(
-                self.name, f"no frame set of all cameras{f': {apart}' * bool(apart)}", "one at least"
-            )
+            why = " before it is cut off" * self._reader.cut_off + f": {apart}" * bool(apart)
+            raise InputError(self.name, f"no frame set of all cameras{why}", "one at least")
         return first
 
     def _step_ns(self) -> int | None:
@@ -203,7 +203,17 @@ class Recording:
     def _fps(self) -> float:
         """The nominal rate: that of the topic with the fewest pictures, which pauses don't change."""
         rates = [rate for times in self._reader.log_times.values() if (rate := rate_of_times(times))]
-        return self._settings.fps or min(rates, default=None) or self._clock.slowest_fps() or 1.0
+        stated = self._settings.fps or min(rates, default=None)
+        if stated is not None:
+            return stated
+        found = self._clock.slowest_fps()
+        if self._reader.written_at_once:
+            guess = f"{found:g} fps, by the first stamps, are" if found else "1 fps is"
+            self._warn(
+                f"its messages were all written down at one time: {guess} taken for its nominal rate;"
+                " `fps` N says what is right"
+            )
+        return found or 1.0
 
     def _make_array(self, first: _Found) -> CameraArray:
         rows, cols = self._settings.grid

@@ -75,6 +75,7 @@ class RecordingReader:
         rig: what was read about cameras; of files without index, up to the end of the chunk at hand.
             None: it is not wanted any more.
         notes: what is unusual about the files, one line each.
+        written_at_once: by the index all messages have one log time, which says nothing of a frame rate.
 
     Raises (also while iterating):
         StreamError: not MCAP, damaged, or a topic holds something other than pictures.
@@ -95,7 +96,7 @@ class RecordingReader:
         self.rig: RecordedRig | None = RecordedRig()
         self.indexed = all(part.indexed for part in self._parts)
         self.notes: list[str] = []
-        self._by_time = False
+        self._by_time = self.written_at_once = False
         self._times: dict[str, list[int]] = {}
         if self.indexed:
             self._check_topics({topic for part in self._parts for topic in part.topics})
@@ -123,6 +124,7 @@ class RecordingReader:
         self._check_topics({topic for part in self._parts for topic in part.topics})
 
     def _plan_order(self) -> None:
+        count = 0
         for topic in self._topics:
             written = [time for part in self._parts for time in part.times_as_written(topic)]
             if was_set_back(written):
@@ -131,6 +133,8 @@ class RecordingReader:
                     " order of the file"
                 )
             self._times[topic] = sorted(set(written))
+            count = max(count, len(written))
+        self.written_at_once = count > 1 and all(len(times) < 2 for times in self._times.values())
         self._by_time = not self.notes
         if self._by_time:
             self._parts.sort(key=lambda part: part.start_ns)
@@ -161,8 +165,10 @@ class RecordingReader:
             choices = [topic for topic in sorted(there) if is_picture(schemas[topic])]
             others = [t for t in sorted(there) if not choices and looks_like_picture(schemas[t])]
             listed = choices or [f"{topic} ({schemas[topic]}, which is not supported)" for topic in others]
-            expected = f"a topic with pictures: {', '.join(listed[:10]) or 'there is none'}"
-            raise StreamError(self.name, f"no topic {missing[0]}", expected)
+            where = " before it is cut off" if self.cut_off else ""
+            none = "a longer part of it" if self.cut_off else "there is none"
+            expected = f"a topic with pictures: {', '.join(listed[:10]) or none}"
+            raise StreamError(self.name, f"no topic {missing[0]}{where}", expected)
 
     def _picture(self, part: ChunkReader, topic: str, message: Message) -> RecordedPicture | None:
         schema = part.schema_of(topic)
