@@ -39,18 +39,18 @@ LEAF = Track(TrackKind.ENHANCED, (2, 1))
 """Nothing builds on this one."""
 
 
-def frames(count: int) -> list[FrameSet]:
-    """A scene in which a near thing moves."""
+def frames(count: int, step: int = 4) -> list[FrameSet]:
+    """A scene in which a near thing moves, by `step` px from frame to frame."""
     found = []
     for index in range(count):
-        left = 30 + 4 * index
+        left = 30 + step * index
         scene = PlaneScene(ARRAY, 2, (Plane(8, (20, left, 44, left + 24)),))
         pictures = {view: scene.render(Viewpoint(*view))[0] // 2 + 40 for view in ARRAY.positions}
         found.append(FrameSet(index, index * 100_000_000, pictures))
     return found
 
 
-def encode(count: int, **changes: Any) -> list[list[Packet]]:
+def encode(count: int, step: int = 4, **changes: Any) -> list[list[Packet]]:
     settings = {
         "qp": 36,
         "preset": "veryfast",
@@ -60,7 +60,7 @@ def encode(count: int, **changes: Any) -> list[list[Packet]]:
         "enhance": 26,
     }
     with Encoder(ARRAY, EncoderConfig(**{**settings, **changes})) as encoder:
-        return [encoder.push(taken) for taken in frames(count)]
+        return [encoder.push(taken) for taken in frames(count, step)]
 
 
 def written(sets: list[list[Packet]]) -> bytes:
@@ -119,6 +119,19 @@ def test_a_client_decodes_only_what_it_wants_from_any_keyframe(coded: list[list[
     whole, late = decoded(file), decoded(file, [(1, 1)], slice(3, 4))
     assert list(late[0].enhanced) == [(1, 1)]
     np.testing.assert_array_equal(late[0].enhanced[1, 1].pixels, whole[3].enhanced[1, 1].pixels)
+
+
+def test_views_that_do_not_change_cost_next_to_nothing() -> None:
+    """What a unit needs to say that nothing changed: its checksum, a frame header, blocks left as they were."""
+
+    def units(step: int) -> list[int]:
+        sets = encode(4, step, gop=4)
+        return [len(packet.data) for packet in sets[3] if packet.track.kind is TrackKind.ENHANCED]
+
+    still, moving = units(0), units(4)
+    assert len(still) == len(moving) == len(VIRTUAL)
+    assert max(still) < 40
+    assert min(moving) > 80
 
 
 def test_some_views_can_be_asked_for() -> None:
