@@ -122,7 +122,7 @@ def test_a_client_decodes_only_what_it_wants_from_any_keyframe(coded: list[list[
 
 
 def test_views_that_do_not_change_cost_next_to_nothing() -> None:
-    """What a unit needs to say that nothing changed: its checksum, a frame header, blocks left as they were."""
+    """A unit says that nothing changed: checksum, a frame header, blocks left as they were."""
 
     def units(step: int) -> list[int]:
         sets = encode(4, step, gop=4)
