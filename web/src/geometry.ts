@@ -70,6 +70,12 @@ export function shiftTo(header: Header, view: Viewpoint, camera: Camera): [numbe
   return [across, cellRho(header) * down];
 }
 
+/** px (x, y) that a view is moved by so that points of a disparity lie where another view has them. */
+export function convergence(header: Header, home: Viewpoint, view: Viewpoint, disparity: number): [number, number] {
+  const [across, down] = shiftTo(header, home, view);
+  return [disparity * across, disparity * down];
+}
+
 /** The real camera nearest to a viewpoint whose pictures can be decoded. */
 export function nearestCamera(header: Header, view: Viewpoint): Camera {
   const away = ({ row, col }: Camera) => (row - view.row) ** 2 + (col - view.col) ** 2;
@@ -117,6 +123,23 @@ export function contributors(
     }
   }
   return found;
+}
+
+/** The cameras that some views need together. */
+export function camerasOf(header: Header, views: readonly Viewpoint[]): Camera[] {
+  const found = new Map<string, Camera>();
+  for (const view of views) {
+    for (const { camera } of contributors(header, view)) found.set(`${camera.row},${camera.col}`, camera);
+  }
+  return [...found.values()];
+}
+
+/** 1 - 1 / the most that what is nearest is enlarged by. */
+const MOST_DOLLY = 0.2;
+
+/** The limit of `ViewSettings.dolly`: what is nearest is enlarged by a quarter at most, which keeps holes few. */
+export function mostDolly(header: Header): number {
+  return MOST_DOLLY / Math.max(header.range[1] - infinityOf(header), 1e-3);
 }
 
 /** Steps of the baseline that disparity belongs to: the horizontal one where there is one. */

@@ -22,6 +22,7 @@ export interface Actions {
   copyLink(): void;
   openFile(): void;
   toggleFullscreen(): void;
+  toggleHeadset(): void;
   showHelp(): void;
   /** A small picture of a time; undefined where there is none. */
   peek(seconds: number): Promise<ImageData | undefined>;
@@ -37,6 +38,7 @@ export interface ControlState {
   readonly speed: number;
   readonly look: Look;
   readonly eyes: Eyes["mode"];
+  readonly isImmersed: boolean;
   readonly section: { from: number; to: number } | undefined;
   readonly isGrowing: boolean;
 }
@@ -59,6 +61,7 @@ export class Controls {
   readonly #eyes = element("select", { "aria-label": TEXTS.views });
   readonly #wipe = element("input", { type: "range", min: "0", max: "1", step: "0.01", value: "0" });
   readonly #focus = element("input", { type: "range", min: "0", max: "100", step: "1", value: "0" });
+  readonly #headset: HTMLButtonElement;
   #range: readonly [number, number] = [0, 1];
   #duration = 0;
   #peeked = 0;
@@ -69,6 +72,11 @@ export class Controls {
     options(this.#speed, SPEEDS.map((speed) => [String(speed), `${speed}×`]));
     options(this.#look, Object.entries(TEXTS.looks));
     options(this.#eyes, Object.entries(TEXTS.eyes));
+    this.#headset = button(TEXTS.headset, TEXTS.headset, () => {
+      this.toggleMenu(false);
+      actions.toggleHeadset();
+    });
+    this.#headset.hidden = true;
     this.menu = this.#makeMenu();
     this.bar = this.#makeBar();
     this.#listen();
@@ -76,6 +84,10 @@ export class Controls {
 
   setRange(range: readonly [number, number]): void {
     this.#range = range;
+  }
+
+  offerHeadset(isThere: boolean): void {
+    this.#headset.hidden = !isThere;
   }
 
   toggleMenu(isOpen = this.menu.hidden): void {
@@ -98,6 +110,12 @@ export class Controls {
     this.#speed.value = String(state.speed);
     this.#look.value = state.look;
     this.#eyes.value = state.eyes;
+    const headset = state.isImmersed ? TEXTS.headsetOff : TEXTS.headset;
+    if (this.#headset.title !== headset) {
+      this.#headset.title = headset;
+      this.#headset.setAttribute("aria-label", headset);
+      this.#headset.textContent = headset;
+    }
     this.#wipe.disabled = state.look === LOOKS[0];
     this.#section.hidden = state.section === undefined;
     if (state.section !== undefined && state.duration > 0) {
@@ -135,6 +153,7 @@ export class Controls {
       element("label", {}, TEXTS.views, this.#eyes),
       element("label", {}, TEXTS.wipe, this.#wipe),
       element("label", {}, TEXTS.focus, this.#focus),
+      this.#headset,
       act(TEXTS.savePicture, () => actions.savePicture()),
       act(TEXTS.saveClip, () => actions.saveClip()),
       act(TEXTS.copyLink, () => actions.copyLink()),

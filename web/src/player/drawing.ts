@@ -1,7 +1,7 @@
 /** One picture of the screen: one view, or two for both eyes. */
 
 import type { Header } from "../container/header.ts";
-import { cellRho, clampView, steps, type Viewpoint } from "../geometry.ts";
+import { clampView, convergence, steps, type Viewpoint } from "../geometry.ts";
 import type { CameraFrame } from "../synthesis/camera_textures.ts";
 import type { ViewRenderer } from "../synthesis/renderer.ts";
 import type { Shown } from "./shown.ts";
@@ -33,13 +33,15 @@ export function apertureOf(header: Header, view: Viewpoint): { view: Viewpoint; 
   return spread(step.row).flatMap((down) =>
     spread(step.col).map((across) => {
       const there = clampView(header, { row: view.row + down, col: view.col + across });
-      const moves = [
-        step.col ? (view.col - there.col) / step.col : 0,
-        step.row ? (cellRho(header) * (view.row - there.row)) / step.row : 0,
-      ] as const;
-      return { view: there, moves };
+      return { view: there, moves: convergence(header, view, there, 1) };
     }),
   );
+}
+
+/** The views that `drawShown` draws. */
+export function viewsShown(header: Header, { view, eyes, focus }: Shown): Viewpoint[] {
+  if (focus !== undefined) return apertureOf(header, view).map((one) => one.view);
+  return eyes.mode === "one" ? [view] : eyesOf(header, view, eyes.distance);
 }
 
 /** Draw what is to be shown on the canvas, with a share of the picture's size each way. */

@@ -34,6 +34,8 @@ export interface ShownState {
   readonly look: Look;
   readonly dolly: number;
   readonly eyes: Eyes["mode"];
+  /** What the left and the right eye see in a headset; null where there is none. */
+  readonly immersed: readonly Viewpoint[] | null;
   readonly isPlaying: boolean;
   readonly speed: number;
   readonly section: { from: number; to: number } | null;
@@ -113,7 +115,7 @@ export class MvcodecPlayer extends HTMLElement {
     await this.#engine!.look({ row, col });
   }
 
-  /** Resolves when the picture stands, in full detail. Not while it plays. */
+  /** Resolves when the picture stands, in full detail. Not while it plays, is held or is in a headset. */
   async settled(): Promise<void> {
     await this.ready;
     await this.#engine!.settled();
@@ -125,7 +127,8 @@ export class MvcodecPlayer extends HTMLElement {
     if (!engine?.isOpen) return undefined;
     const { view, look, dolly, eyes } = engine.shown;
     const { isPlaying, speed, section = null } = engine.playback;
-    return { frame: engine.frame, count: engine.count, view, look, dolly, eyes: eyes.mode, isPlaying, speed, section };
+    const { frame, count, immersed = null } = engine;
+    return { frame, count, view, look, dolly, eyes: eyes.mode, immersed, isPlaying, speed, section };
   }
 
   play(): void {

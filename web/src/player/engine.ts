@@ -1,20 +1,21 @@
 /** What is shown: a recording, a frame and a viewpoint, drawn when they change and not otherwise. */
 
 import type { Header } from "../container/header.ts";
-import { topicOf } from "../container/messages.ts";
 import { LiveRecording } from "../container/live.ts";
 import { openRecording } from "../container/open.ts";
-import { frameAt, frameCount, keySpanAt, timeOf, type Recording } from "../container/recording.ts";
+import { frameAt, frameCount, timeOf, type Recording } from "../container/recording.ts";
 import type { Source } from "../container/sources.ts";
-import { FrameStore } from "../decode/frame_store.ts";
-import { smallPicture } from "../decode/planes.ts";
-import { clampView, contributors, infinityOf, nearestCamera, type Camera, type Viewpoint } from "../geometry.ts";
-import type { CameraFrame } from "../synthesis/camera_textures.ts";
+import { camerasOf, clampView, type Viewpoint } from "../geometry.ts";
+import { finished } from "../synthesis/gl.ts";
 import { ViewRenderer, type Pixels } from "../synthesis/renderer.ts";
-import { apertureOf, drawShown, eyesOf } from "./drawing.ts";
+import { drawShown, viewsShown } from "./drawing.ts";
+import { Immersive, type Due } from "./immersive.ts";
 import { Playback } from "./playback.ts";
 import type { Shown } from "./shown.ts";
+import { Standing } from "./standing.ts";
+import { Supply } from "./supply.ts";
 import { Tempo } from "./tempo.ts";
+import { Waiters } from "./waiters.ts";
 
 /** Told to whoever shows the controls. */
 export interface EngineEvents {
@@ -28,21 +29,6 @@ export interface EngineEvents {
   onTrouble(text: string, isFatal: boolean): void;
 }
 
-interface Decoded {
-  readonly frame: number;
-  readonly frames: readonly CameraFrame[];
-  /** The cameras that were asked for. */
-  readonly asked: string;
-}
-
-/** A picture that takes longer is waited for visibly. */
-const WAITING_MS = 250;
-/** Frames that are decoded ahead while playing. */
-const PREFETCH = 4;
-/** 1 - 1 / the most that what is nearest is enlarged by. */
-const MOST_DOLLY = 0.2;
-/** The picture stands when nothing has changed for so long. */
-const STANDS_MS = 120;
 
 export class Engine {
   readonly shown: Shown = { frame: 0, view: { row: 0, col: 0 }, look: "picture", dolly: 0, eyes: { mode: "one", distance: 0.5 }, wipe: 0, focus: undefined };
@@ -52,14 +38,9 @@ export class Engine {
   readonly #events: EngineEvents;
   #source: Source | undefined;
   #recording: Recording | undefined;
-  #store: FrameStore | undefined;
+  #supply: Supply | undefined;
   #renderer: ViewRenderer | undefined;
-  #decoded: Decoded | undefined;
-  #peeks: FrameStore | undefined;
-  #peeked = 0;
-  /** How long the last frame took to decode. */
-  decodeMs = 0;
-  #isFetching = false;
+  #immersive: Immersive | undefined;
   /** The newest frame of a live view. */
   #liveFrame: number | undefined;
   #isDirty = false;
@@ -68,14 +49,17 @@ export class Engine {
   #isFinalDue = false;
   #drawnView: Viewpoint | undefined;
   #tick: number | undefined;
-  #stands: ReturnType<typeof setTimeout> | undefined;
-  #waiters: { isDone: () => boolean; resolve: () => void }[] = [];
+  readonly #standing = new Standing(() => this.#stands());
+  readonly #waiters = new Waiters();
   isClosed = false;
 
   constructor(canvas: HTMLCanvasElement, events: EngineEvents) {
     this.#canvas = canvas;
     this.#events = events;
-    canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.#immersive?.end();
+    });
     canvas.addEventListener("webglcontextrestored", () => this.#restore());
   }
 
@@ -90,7 +74,17 @@ export class Engine {
     if (typeof source === "string") this.#liveFrame = 0;
     else this.#source = source;
     this.#recording = recording;
-    this.#store = new FrameStore(recording, (text) => this.#events.onTrouble(text, false));
+    this.#supply = new Supply(recording, {
+      isWanted: (frame) => this.shown.frame === frame,
+      isPlaying: () => this.playback.isPlaying,
+      onDecoded: () => {
+        if (this.#immersive !== undefined) this.#events.onFrame();
+        this.wake();
+      },
+      onMissing: (frame) => (this.shown.frame = frame + 1),
+      onWaiting: (isWaiting) => this.#events.onWaiting(isWaiting),
+      onTrouble: (text, isFatal) => this.#trouble(text, isFatal),
+    });
     const { header } = recording;
     this.#renderer = new ViewRenderer(this.#canvas, header);
     this.shown.frame = frameAt(recording.spans, at.seconds ?? 0);
@@ -103,11 +97,11 @@ export class Engine {
     this.isClosed = true;
     this.playback.pause();
     if (this.#tick !== undefined) cancelAnimationFrame(this.#tick);
-    clearTimeout(this.#stands);
+    this.#standing.close();
+    this.#immersive?.end();
     this.#recording?.close();
-    this.#store?.close();
-    this.#peeks?.close();
-    this.#waiters.splice(0).forEach(({ resolve }) => resolve());
+    this.#supply?.close();
+    this.#waiters.releaseAll();
   }
 
   get isOpen(): boolean {
@@ -134,7 +128,17 @@ export class Engine {
 
   /** The frame that is on the screen. */
   get frame(): number {
-    return this.#decoded?.frame ?? 0;
+    return this.#supply?.decoded?.frame ?? 0;
+  }
+
+  /** How long the last frame took to decode. */
+  get decodeMs(): number {
+    return this.#supply?.decodeMs ?? 0;
+  }
+
+  /** What each eye of a headset sees; undefined where the screen shows the picture. */
+  get immersed(): readonly Viewpoint[] | undefined {
+    return this.#immersive?.views;
   }
 
   timeOf(frame: number): number {
@@ -167,12 +171,11 @@ export class Engine {
   /** Resolves when what is asked for is on the screen, with all detail. */
   async settled(): Promise<void> {
     await this.#settled();
-    await new Promise<void>((resolve) => {
-      const isDone = () => this.#isFinal && !this.#isDirty && this.#decoded?.frame === this.shown.frame;
-      this.#waiters.push({ isDone, resolve });
-      this.#standsSoon();
-      this.wake();
-    });
+    const isDone = () => this.#isFinal && !this.#isDirty && this.#supply?.decoded?.frame === this.shown.frame;
+    const standing = this.#waiters.until(isDone);
+    this.#standing.moved();
+    this.wake();
+    await standing;
   }
 
   play(): void {
@@ -190,157 +193,139 @@ export class Engine {
 
   /** The view that is shown, at picture size, whatever the screen shows of it: as it stands or, not `fine`, as it moves. Throws Error before the first picture. */
   pixels(fine = true): Pixels {
-    if (this.#renderer === undefined || this.#decoded === undefined) throw new Error("no picture yet");
+    const frames = this.#supply?.decoded?.frames;
+    if (this.#renderer === undefined || frames === undefined) throw new Error("no picture yet");
     const { view, look, dolly } = this.shown;
-    const pixels = this.#renderer.read(this.#decoded.frames, view, { look, fine, dolly });
-    this.#draw(true); // the canvas may have lost what it showed
+    const pixels = this.#renderer.read(frames, view, { look, fine, dolly });
+    if (this.#immersive === undefined) this.#draw(true); // the canvas may have lost what it showed
     return pixels;
   }
 
   /** What is seen at a place of the picture, from its upper left in shares of its size. */
   probe(x: number, y: number): { disparity: number; isSeen: boolean } | undefined {
-    if (this.#renderer === undefined || this.#decoded === undefined || this.shown.eyes.mode !== "one") return undefined;
+    const frames = this.#supply?.decoded?.frames;
+    if (this.#renderer === undefined || frames === undefined || this.shown.eyes.mode !== "one") return undefined;
     const { width, height } = this.header;
     const { view, look, dolly } = this.shown;
     const [column, row] = [Math.floor(x * width), Math.floor(y * height)];
     if (column < 0 || row < 0 || column >= width || row >= height) return undefined;
-    return this.#renderer.probe(this.#decoded.frames, view, { look, dolly, fine: false }, column, row);
+    return this.#renderer.probe(frames, view, { look, dolly, fine: false }, column, row);
   }
 
   /** A small picture of a time, from the nearest camera and keyframe; undefined where it is damaged. */
   async peek(seconds: number, width: number): Promise<ImageData | undefined> {
-    if (this.#recording === undefined) return undefined;
-    const { spans } = this.#recording;
-    this.#peeks ??= new FrameStore(this.#recording, () => {}); // its decoders do not disturb those that play
-    const frame = keySpanAt(spans, frameAt(spans, seconds)).first;
-    const topic = topicOf(nearestCamera(this.header, this.shown.view), "video");
-    const number = ++this.#peeked;
-    const planes = await this.#peeks.planes(topic, frame, () => number === this.#peeked);
-    return planes && smallPicture(planes, width);
+    return this.#supply?.peek(this.shown.view, seconds, width);
   }
 
-  /** The limit of `dolly`: what is nearest is enlarged by a quarter at most, which keeps holes few. */
-  get mostDolly(): number {
-    return MOST_DOLLY / Math.max(this.header.range[1] - infinityOf(this.header), 1e-3);
+  /** The picture is held, as by a pointer that drags it: it does not come to stand. */
+  hold(isHeld: boolean): void {
+    this.#standing.hold(isHeld);
+  }
+
+  /** Show it in a headset until the viewer, or `leave`, ends that. Throws Error where that is refused, or before a file is open. */
+  async immerse(): Promise<void> {
+    if (this.#renderer === undefined) throw new Error("no file is open");
+    const due = (now: number, views: readonly Viewpoint[]) => this.#due(now, views);
+    const started = await Immersive.start(this.#renderer, this.header, this.shown.view, due, () => this.#left());
+    if (this.isClosed) started.end();
+    else this.#immersive = started;
+    this.#events.onState();
+  }
+
+  leave(): void {
+    this.#immersive?.end();
   }
 
   /** Look whether there is something to do, with the next picture of the screen. */
   wake(): void {
     this.#isDirty = true;
-    if (this.#tick === undefined && !this.isClosed) this.#tick = requestAnimationFrame((now) => this.#run(now));
+    if (this.#tick === undefined && !this.isClosed && this.#immersive === undefined) this.#tick = requestAnimationFrame((now) => this.#run(now));
   }
 
   async #settled(): Promise<void> {
-    const goal = { frame: this.shown.frame, view: this.shown.view };
+    const { view } = this.shown;
     this.wake();
-    await new Promise<void>((resolve) => {
-      // A later goal replaces this one.
-      const isDone = () =>
-        goal.view !== this.shown.view || (this.#decoded !== undefined && this.#decoded.frame === this.shown.frame && !this.#isDirty);
-      this.#waiters.push({ isDone, resolve });
-    });
+    // A later goal replaces this one.
+    const isDone = () => view !== this.shown.view || (this.#supply?.decoded?.frame === this.shown.frame && !this.#isDirty);
+    await this.#waiters.until(isDone);
   }
 
   #run(now: number): void {
     this.#tick = undefined;
-    const { playback } = this;
-    if (playback.isPlaying) {
-      this.shown.frame = this.frameAt(playback.timeAt(now));
-      if (!playback.isPlaying) this.#events.onState();
-    }
+    if (this.#immersive !== undefined) return;
+    this.#playOn(now);
     // While the next frame is decoded, the one that is there can be seen from elsewhere.
-    const isReady = this.#fetch() || this.#drawnView !== this.shown.view;
-    if (isReady && this.#isDirty && this.#decoded !== undefined) {
+    const isReady = (this.isOpen && this.#fetch(viewsShown(this.header, this.shown))) || this.#drawnView !== this.shown.view;
+    if (isReady && this.#isDirty && this.#supply?.decoded !== undefined) {
       this.#isDirty = false;
       const isFinal = this.#isFinalDue || this.tempo.isQuick;
-      this.#isFinalDue = false;
       this.#draw(isFinal);
       if (!isFinal) this.tempo.drawn(now);
+      else if (this.#isFinalDue) void this.#time();
+      this.#isFinalDue = false;
       this.#events.onFrame();
-      this.#standsSoon();
+      this.#standing.moved();
     }
-    this.#waiters = this.#waiters.filter(({ isDone, resolve }) => !isDone() || void resolve());
-    if (playback.isPlaying) this.wake();
+    this.#waiters.look();
+    if (this.playback.isPlaying) this.wake();
   }
 
-  /** A picture that stands is drawn as well as can be. */
-  #standsSoon(): void {
-    clearTimeout(this.#stands);
-    this.#stands = setTimeout(() => {
-      this.#stands = undefined;
-      this.tempo.rest();
-      if (this.#isFinal || this.playback.isPlaying) return;
-      this.#isFinalDue = true;
-      this.wake();
-    }, STANDS_MS);
+  /** What is to be drawn for a headset, whose own clock comes in place of the screen's. */
+  #due(now: number, views: readonly Viewpoint[]): Due {
+    this.#playOn(now);
+    if (this.#fetch(views)) this.#isDirty = false;
+    this.tempo.drawn(now);
+    this.#waiters.look();
+    return { frames: this.#supply?.decoded?.frames, shown: this.shown, detail: this.tempo.detail };
   }
 
-  #draw(isFinal: boolean): void {
-    if (this.#renderer === undefined || this.#decoded === undefined) return;
-    this.#isFinal = isFinal;
-    this.#drawnView = this.shown.view;
-    drawShown(this.#renderer, this.#canvas, this.header, this.#decoded.frames, this.shown, isFinal ? 1 : this.tempo.detail, isFinal);
-  }
-
-  /** Whether what is to be shown is decoded; begins to decode it where it is not. */
-  #fetch(): boolean {
-    if (this.#recording === undefined || this.#store === undefined) return false;
-    const { frame } = this.shown;
-    const wanted = this.#wanted();
-    const asked = wanted.map(({ row, col }) => `${row},${col}`).join(" ");
-    if (this.#decoded?.frame === frame && this.#decoded.asked === asked) return true;
-    if (!this.#isFetching) void this.#decode(frame, wanted, asked);
-    return false;
-  }
-
-  /** The cameras of all views that are drawn at once. */
-  #wanted(): Camera[] {
-    const { header } = this;
-    const found = new Map<string, Camera>();
-    const { view, eyes, focus } = this.shown;
-    const lens = focus === undefined ? [view] : apertureOf(header, view).map((one) => one.view);
-    for (const one of eyes.mode === "one" ? lens : eyesOf(header, view, eyes.distance)) {
-      for (const { camera } of contributors(header, one)) found.set(`${camera.row},${camera.col}`, camera);
-    }
-    return [...found.values()];
-  }
-
-  async #decode(frame: number, wanted: readonly Camera[], asked: string): Promise<void> {
-    this.#isFetching = true;
-    const timer = setTimeout(() => this.#events.onWaiting(true), WAITING_MS);
-    const since = performance.now();
-    try {
-      const store = this.#store!;
-      const isWanted = () => this.playback.isPlaying || this.shown.frame === frame;
-      const frames = await store.get(frame, wanted, isWanted);
-      this.decodeMs = performance.now() - since;
-      if (frames.length > 0 && store === this.#store) this.#decoded = { frame, frames, asked };
-      else if (frames.length === 0 && isWanted()) this.#skip(frame, asked);
-      if (this.playback.isPlaying) this.#prefetch(frame, wanted);
-    } catch (error) {
-      this.playback.pause();
-      this.#events.onTrouble((error as Error).message, true);
-      this.#waiters.splice(0).forEach(({ resolve }) => resolve());
-      return;
-    } finally {
-      clearTimeout(timer);
-      this.#isFetching = false;
-      this.#events.onWaiting(false);
-    }
+  /** The headset is off: the screen shows the picture again. */
+  #left(): void {
+    this.#immersive = undefined;
+    this.tempo.rest();
+    this.#events.onState();
     this.wake();
   }
 
-  /** No camera has this frame: the last picture stays, as if it were this one. */
-  #skip(frame: number, asked: string): void {
-    if (this.#decoded === undefined && frame + 1 < this.count) this.shown.frame = frame + 1;
-    else this.#decoded = { frame, frames: this.#decoded?.frames ?? [], asked };
+  #playOn(now: number): void {
+    const { playback } = this;
+    if (!playback.isPlaying) return;
+    this.shown.frame = this.frameAt(playback.timeAt(now));
+    if (!playback.isPlaying) this.#events.onState();
   }
 
-  #prefetch(frame: number, wanted: readonly Camera[]): void {
-    const isWanted = () => this.playback.isPlaying;
-    for (let next = frame + 1; next <= Math.min(frame + PREFETCH, this.count - 1); next++) {
-      void this.#store!.get(next, wanted, isWanted).catch(() => {}); // it is asked for again when it is due
-    }
+  /** A picture that stands is drawn as well as can be. */
+  #stands(): void {
+    this.tempo.rest();
+    if (this.#isFinal || this.playback.isPlaying) return;
+    this.#isFinalDue = true;
+    this.wake();
+  }
+
+  /** How long a picture takes that stands: those who move on at once should not wait for it again. */
+  async #time(): Promise<void> {
+    const since = performance.now();
+    await finished(this.#renderer!.gl);
+    this.#standing.took(performance.now() - since);
+  }
+
+  #draw(isFinal: boolean): void {
+    const frames = this.#supply?.decoded?.frames;
+    if (this.#renderer === undefined || frames === undefined) return;
+    this.#isFinal = isFinal;
+    this.#drawnView = this.shown.view;
+    drawShown(this.#renderer, this.#canvas, this.header, frames, this.shown, isFinal ? 1 : this.tempo.detail, isFinal);
+  }
+
+  /** Whether what some views need of the frame that is due is decoded; begins to decode it where it is not. */
+  #fetch(views: readonly Viewpoint[]): boolean {
+    return this.#supply?.fetch(this.shown.frame, camerasOf(this.header, views)) ?? false;
+  }
+
+  #trouble(text: string, isFatal: boolean): void {
+    if (isFatal) this.playback.pause();
+    this.#events.onTrouble(text, isFatal);
+    if (isFatal) this.#waiters.releaseAll();
   }
 
   #grown(): void {

@@ -3,6 +3,8 @@
 export interface GestureEvents {
   /** Somebody touches the player for the first time, or again. */
   onTouch(): void;
+  /** The picture is held by a pointer, or let go. */
+  onHold(isHeld: boolean): void;
   /** The view was dragged by so much of the picture's width and height. */
   onDrag(across: number, down: number): void;
   /** The pointer hovers there, from the picture's upper left; undefined: it left. */
@@ -61,6 +63,7 @@ export class Gestures {
   #down(event: PointerEvent): void {
     this.#events.onTouch();
     this.#pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    this.#events.onHold(true);
     this.#stage.setPointerCapture(event.pointerId);
     if (this.#pointers.size > 1) {
       this.#isDragged = true;
@@ -93,6 +96,7 @@ export class Gestures {
   #up(event: PointerEvent): void {
     if (!this.#pointers.delete(event.pointerId)) return;
     this.#stage.classList.remove("dragging");
+    if (this.#pointers.size === 0) this.#events.onHold(false);
     if (this.#isDragged || event.type === "pointercancel" || event.button !== 0) return;
     // A second click soon after means full screen, and the first one nothing.
     if (this.#clicked === undefined) {

@@ -41,6 +41,14 @@ export function keyActions(ui: Ui): ReadonlyMap<string, () => void> {
   ]);
 }
 
+/** Whether a key is meant for the control that has the focus, or for the browser. */
+export function isForControl(event: KeyboardEvent): boolean {
+  const target = event.composedPath()[0];
+  if (event.ctrlKey || event.metaKey || event.altKey || target instanceof HTMLSelectElement) return true;
+  if (target instanceof HTMLInputElement) return target.type !== "range" || /^(Arrow|Home|End)/.test(event.key);
+  return target instanceof HTMLButtonElement && (event.key === " " || event.key === "Enter");
+}
+
 /** The dialog that lists the keys. */
 export function keyList(): HTMLDialogElement {
   const dialog = element("dialog", { "aria-label": TEXTS.help });

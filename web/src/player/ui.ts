@@ -1,14 +1,16 @@
 /** What surrounds the picture: controls, gestures, keys, messages; and how they act on the engine. */
 
-import { depthOf } from "../geometry.ts";
+import { mostDolly } from "../geometry.ts";
 import { LOOKS } from "../synthesis/renderer.ts";
 import { Controls } from "./controls.ts";
 import { button, element, icon } from "./dom.ts";
 import { EYE_MODES } from "./drawing.ts";
 import type { Engine } from "./engine.ts";
 import { Gestures } from "./gestures.ts";
-import { keyActions, keyList } from "./keys.ts";
+import { hasHeadset } from "./immersive.ts";
+import { isForControl, keyActions, keyList } from "./keys.ts";
 import { Looking } from "./looking.ts";
+import { Probe } from "./probe.ts";
 import { Section, type Mark } from "./section.ts";
 import { statistics } from "./statistics.ts";
 import { linkTo, saveClip, savePicture } from "./take_away.ts";
@@ -29,7 +31,7 @@ export class Ui {
   readonly #hint = element("p", { class: "hint", hidden: true }, TEXTS.hint);
   readonly #notice = element("div", { class: "notice", role: "alert", hidden: true });
   readonly #stats = element("pre", { class: "stats", hidden: true });
-  readonly #probe = element("p", { class: "probe", hidden: true });
+  readonly #probe = new Probe();
   readonly #spoken = element("p", { class: "unseen", role: "status" });
   readonly #dialog = keyList();
   readonly #file = element("input", { type: "file", accept: ".mcap", hidden: true });
@@ -55,7 +57,7 @@ export class Ui {
     this.#big.hidden = true;
     this.#stage.append(canvas, this.#poster);
     const middle = element("div", { class: "middle" }, this.#wait, this.#big);
-    root.append(this.#stage, middle, this.#hint, this.#stats, this.#probe, this.controls.bar, this.controls.menu,
+    root.append(this.#stage, middle, this.#hint, this.#stats, this.#probe.label, this.controls.bar, this.controls.menu,
       this.#notice, this.#spoken, this.#dialog, this.#file);
   }
 
@@ -64,6 +66,7 @@ export class Ui {
     const { signal } = this.#stop;
     this.#gestures = new Gestures(this.#stage, {
       onTouch: () => this.endSway(),
+      onHold: (isHeld) => this.#engine?.hold(isHeld),
       onDrag: (across, down) => this.looking.drag(across, down),
       onHover: (at) => this.#hover(at),
       onDolly: (by) => this.dolly(by),
@@ -74,8 +77,7 @@ export class Ui {
     // The page listens everywhere, an element within another page only where it has the focus.
     const keyboard: EventTarget = this.#host.hasAttribute("page") ? document : this.#host;
     keyboard.addEventListener("keydown", (event) => this.#key(event as KeyboardEvent), { signal });
-    this.#host.addEventListener("pointermove", () => this.#awake(), { signal });
-    this.#host.addEventListener("focusin", () => this.#awake(), { signal });
+    for (const name of ["pointermove", "focusin"]) this.#host.addEventListener(name, () => this.#awake(), { signal });
     this.#host.addEventListener("dragover", (event) => event.preventDefault(), { signal });
     this.#host.addEventListener("drop", (event) => {
       event.preventDefault();
@@ -86,6 +88,9 @@ export class Ui {
       const [file] = this.#file.files ?? [];
       if (file !== undefined) this.#open(file);
     }, { signal });
+    const lookForHeadset = () => void hasHeadset().then((isThere) => this.controls.offerHeadset(isThere));
+    navigator.xr?.addEventListener("devicechange", lookForHeadset, { signal });
+    lookForHeadset();
     const poster = this.#host.getAttribute("poster");
     this.#poster.hidden = poster === null;
     if (poster !== null) this.#poster.src = poster;
@@ -144,6 +149,7 @@ export class Ui {
       speed: playback.speed,
       look: shown.look,
       eyes: shown.eyes.mode,
+      isImmersed: engine.immersed !== undefined,
       section: playback.section,
       isGrowing: engine.isGrowing,
     });
@@ -194,7 +200,8 @@ export class Ui {
   dolly(by: number): void {
     const engine = this.#engine;
     if (!engine?.isOpen) return;
-    void engine.change({ dolly: Math.min(Math.max(engine.shown.dolly + by * engine.mostDolly, 0), engine.mostDolly) });
+    const most = mostDolly(engine.header);
+    void engine.change({ dolly: Math.min(Math.max(engine.shown.dolly + by * most, 0), most) });
   }
 
   changeSpeed(speed: number): void {
@@ -279,6 +286,14 @@ export class Ui {
     await navigator.clipboard.writeText(link).then(() => this.tell(TEXTS.linkCopied), () => this.tell(link));
   }
 
+  /** Into the headset, or out of it. */
+  async toggleHeadset(): Promise<void> {
+    const engine = this.#engine;
+    if (!engine?.isOpen) return;
+    if (engine.immersed !== undefined) engine.leave();
+    else await engine.immerse().catch((error: Error) => this.tell(TEXTS.noHeadset(error.message)));
+  }
+
   #actions() {
     return {
       togglePlay: () => this.togglePlay(),
@@ -294,6 +309,7 @@ export class Ui {
       copyLink: () => void this.copyLink(),
       openFile: () => this.openFile(),
       toggleFullscreen: () => this.toggleFullscreen(),
+      toggleHeadset: () => void this.toggleHeadset(),
       showHelp: () => this.showHelp(),
       peek: async (seconds: number) => this.#engine?.peek(seconds, PEEK_PX),
     };
@@ -302,26 +318,11 @@ export class Ui {
   #hover(at: { x: number; y: number } | undefined): void {
     const engine = this.#engine;
     if (!engine?.isOpen) return;
-    this.#probe.hidden = true;
+    this.#probe.hide();
     if (at === undefined || !this.looking.hovers) return;
     this.endSway();
     this.looking.hover(at.x - 0.5, at.y - 0.5);
-    if (!engine.playback.isPlaying && engine.shown.look !== "picture") this.#showProbe(at);
-  }
-
-  #showProbe(at: { x: number; y: number }): void {
-    const engine = this.#engine!;
-    const { width, height } = engine.header;
-    const box = this.#stage.getBoundingClientRect();
-    const scale = Math.min(box.width / width, box.height / height);
-    const x = 0.5 + ((at.x - 0.5) * box.width) / (width * scale);
-    const y = 0.5 + ((at.y - 0.5) * box.height) / (height * scale);
-    const found = engine.probe(x, y);
-    if (found === undefined) return;
-    this.#probe.textContent = TEXTS.disparity(found.disparity, depthOf(engine.header, found.disparity));
-    this.#probe.style.left = `${at.x * box.width + 14}px`;
-    this.#probe.style.top = `${at.y * box.height + 14}px`;
-    this.#probe.hidden = false;
+    if (!engine.playback.isPlaying && engine.shown.look !== "picture") this.#probe.show(engine, at, this.#stage.getBoundingClientRect());
   }
 
   #click(): void {
@@ -330,13 +331,8 @@ export class Ui {
   }
 
   #key(event: KeyboardEvent): void {
-    const target = event.composedPath()[0];
-    if (event.ctrlKey || event.metaKey || event.altKey || target instanceof HTMLSelectElement || this.#dialog.open) return;
-    if (target instanceof HTMLInputElement && /^(Arrow|Home|End)/.test(event.key)) return;
-    if (target instanceof HTMLButtonElement && (event.key === " " || event.key === "Enter")) return;
-    if (target instanceof HTMLInputElement && target.type !== "range") return;
     const action = this.#keys.get(event.key);
-    if (action === undefined) return;
+    if (action === undefined || this.#dialog.open || isForControl(event)) return;
     event.preventDefault();
     this.endSway();
     action();

@@ -50,6 +50,30 @@ export class Program {
     }
     return place;
   }
+
+  delete(): void {
+    this.#gl.deleteProgram(this.#program);
+  }
+}
+
+/** How often it is looked whether the GPU has finished, ms. */
+const POLL_MS = 8;
+
+/** Resolves when the GPU has done all that it was asked for so far. */
+export function finished(gl: WebGL2RenderingContext): Promise<void> {
+  const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+  gl.flush();
+  return new Promise((resolve) => {
+    const look = () => {
+      if (fence !== null && gl.clientWaitSync(fence, 0, 0) === gl.TIMEOUT_EXPIRED) {
+        setTimeout(look, POLL_MS);
+        return;
+      }
+      gl.deleteSync(fence);
+      resolve();
+    };
+    look();
+  });
 }
 
 export interface Bindable {

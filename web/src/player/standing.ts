@@ -1,0 +1,46 @@
+/** When a moving picture comes to stand, so that it is worth all detail. */
+
+/** Nothing has changed for so long. */
+const STANDS_MS = 120;
+/** The same where pictures in all detail take long: one that comes too early holds up whoever still moves. */
+const LONGEST_MS = 1000;
+
+export class Standing {
+  readonly #onStands: () => void;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #isHeld = false;
+  #isDue = false;
+  #costMs = 0;
+
+  constructor(onStands: () => void) {
+    this.#onStands = onStands;
+  }
+
+  /** How long nothing must change, ms. */
+  get patience(): number {
+    return Math.min(Math.max(STANDS_MS, this.#costMs), LONGEST_MS);
+  }
+
+  /** Something has changed. */
+  moved(): void {
+    clearTimeout(this.#timer);
+    this.#isDue = this.#isHeld;
+    if (this.#isHeld) return;
+    this.#timer = setTimeout(() => this.#onStands(), this.patience);
+  }
+
+  /** Somebody holds the picture: it does not stand until it is let go. */
+  hold(isHeld: boolean): void {
+    this.#isHeld = isHeld;
+    if (isHeld || this.#isDue) this.moved();
+  }
+
+  /** A picture in all detail took so long, ms. */
+  took(ms: number): void {
+    this.#costMs = ms;
+  }
+
+  close(): void {
+    clearTimeout(this.#timer);
+  }
+}
