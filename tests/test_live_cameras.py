@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import signal
 import subprocess
+import threading
 import time
 import warnings
 from collections.abc import Callable
@@ -12,15 +14,17 @@ from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
+import av
 import numpy as np
 import pytest
 from command_line import COMMAND, fails
-from live_senders import FPS, NUMBERS, Sender, Server, free_port
+from live_senders import FPS, NUMBERS, Sender, Server, free_port, transport_stream
 from timed_videos import number_of, numbered
 
 from mvcodec.capture.live_address import Opened, how_to_open, is_live_address
+from mvcodec.capture.live_camera import LiveCamera
 from mvcodec.capture.live_cameras import LiveCameras, LiveSettings
-from mvcodec.capture.live_clock import ArrivalClock, common_clock
+from mvcodec.capture.live_clock import HELD_BACK, ArrivalClock, common_clock
 from mvcodec.container import read_info
 from mvcodec.errors import InputError, SettingError
 
@@ -200,6 +204,52 @@ def test_the_least_delay_counts_and_is_forgotten_after_a_while() -> None:
     assert clock.shift_ns == 900
     assert common_clock([0, 10**9])
     assert not common_clock([0, 3 * 10**9])
+
+
+class Noting(ArrivalClock):
+    """A clock that notes how much later than their stamps pictures arrive."""
+
+    def __init__(self, held_back: int) -> None:
+        super().__init__(held_back)
+        self.delays_ns: list[int] = []
+
+    def push(self, stamp_ns: int, arrival_ns: int) -> None:
+        self.delays_ns.append(arrival_ns - stamp_ns)
+        super().push(stamp_ns, arrival_ns)
+
+
+class Pieces(io.RawIOBase):
+    """A connection that brings one picture after another, and ends."""
+
+    def __init__(self, count: int) -> None:
+        self._pieces = (data for _, data in islice(transport_stream(0), count))
+        self._rest = b""
+        self.come = 0
+
+    def readable(self) -> bool:
+        return True
+
+    def read(self, size: int = -1) -> bytes:
+        if not self._rest:
+            self._rest = next(self._pieces, b"")
+            self.come += bool(self._rest)
+        piece, self._rest = self._rest[:size], self._rest[size:]
+        return piece
+
+
+def test_what_ffmpeg_lets_go_of_when_a_connection_ends_tells_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its last pictures come a frame and two sooner than all before them."""
+    pieces = Pieces(40)
+    step_ns = 10**9 // FPS
+    monkeypatch.setattr("mvcodec.capture.live_camera.time.time_ns", lambda: (pieces.come - 1) * step_ns)
+    camera = LiveCamera("a", threading.Condition())
+    clock = camera.clock = Noting(HELD_BACK)
+    options = {"analyzeduration": "0", "probesize": "4096"}
+    with av.open(pieces, "r", format="mpegts", options=options, buffer_size=1880) as container:
+        assert list(camera._pictures(container, container.streams.video[0]))
+    usual, *last = clock.delays_ns[-4:]
+    assert [round((delay - usual) / step_ns) for delay in last] == [0, -1, -2]
+    assert clock.shift_ns == min(clock.delays_ns[:-2])
 
 
 @pytest.mark.parametrize(

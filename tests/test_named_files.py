@@ -104,6 +104,6 @@ def test_the_command_takes_files_apart_and_names_as_they_are(
     monkeypatch.chdir(tmp_path)
     options = ["--split", "1x2", "--qp", "40", "--preset", "ultrafast", "--json"]
     assert '"frames": 2' in succeeds("encode", "-a:b 5%d ü.mp4", "o.mcap", *options)
-    assert "--split: found with a recording" in fails(
-        2, "encode", "o.mcap", "x.mcap", "--topics", "/a", "--split", "1x2"
+    assert "--split: found with live cameras, expected no such option" in fails(
+        2, "encode", "udp://127.0.0.1:9", "x.mcap", "--split", "1x2"
     )

@@ -5,11 +5,13 @@ from __future__ import annotations
 import io
 import random
 import warnings
+from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 import numpy as np
 import pytest
 from coding import Pipe
+from command_line import fails, succeeds
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
@@ -19,6 +21,7 @@ from timed_videos import SIZE, number_of, numbered
 
 from mvcodec.capture.recording import Recording
 from mvcodec.capture.recording_settings import RecordingSettings
+from mvcodec.container import read_info
 from mvcodec.errors import InputError, SettingError, StreamError
 
 PAUSE_NS = 60 * 10**9
@@ -298,3 +301,40 @@ def test_one_raw_picture_reads_as_it_was_taken() -> None:
     """What the tests above compare with can be told apart."""
     assert number_of(numbered(37)) == 37
     assert raw(3, 1).data != raw(4, 1).data
+
+
+def stereo(number: int, first: int) -> RawImage:
+    """Two cameras beside each other in one picture."""
+    both = np.concatenate([numbered(number, first), numbered(number, first + 1)], axis=1)
+    return RawImage(
+        width=both.shape[1],
+        height=both.shape[0],
+        encoding="rgb8",
+        step=3 * both.shape[1],
+        data=both.tobytes(),
+    )
+
+
+def test_a_topic_may_hold_several_views_in_each_picture() -> None:
+    data = written([(TOPICS[t], stereo(n, 2 * t), at(n), at(n)) for n in range(3) for t in (0, 1)])
+    read = Read(data, split=(1, 2), real="all")
+    assert (read.recording.array.cols, read.recording.array.width) == (4, SIZE[0])
+    assert read.numbers == [[n] * 4 for n in range(3)]
+    for n, pictures in enumerate(read.pictures):
+        assert list(pictures) == [(0, col) for col in range(4)]
+        for (_, col), picture in pictures.items():
+            np.testing.assert_array_equal(picture, numbered(n, col))
+    assert [list(pictures) for pictures in Read(data, split=(1, 2)).pictures] == [[(0, 0), (0, 3)]] * 3
+    with pytest.raises(InputError, match="a width that 1 and a height that 7 divide"):
+        Read(data, split=(7, 1))
+    with pytest.raises(SettingError, match="split: found with depth_topics"):
+        RecordingSettings((TOPICS,), split=(1, 2), depth_topics=(("/d", "/e"),))
+
+
+def test_the_command_splits_topics(tmp_path: Path) -> None:
+    (tmp_path / "rec.mcap").write_bytes(written([("/zed", stereo(n, 0), at(n), at(n)) for n in range(2)]))
+    asked = ("encode", tmp_path / "rec.mcap", tmp_path / "out.mcap", "--topics", "/zed", "--split", "1x2")
+    assert "1 topics of 1x2 views each, expected 2x2" in fails(2, *asked, "--grid", "2x2")
+    succeeds(*asked, "--grid", "1x2", "--matcher", "sgbm")
+    info = read_info(tmp_path / "out.mcap")
+    assert (info.frames, info.header.array.real) == (2, ((0, 0), (0, 1)))

@@ -19,7 +19,7 @@ from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from mvcodec.capture.live_address import how_to_open
-from mvcodec.capture.live_clock import ArrivalClock
+from mvcodec.capture.live_clock import HELD_BACK, ArrivalClock
 from mvcodec.capture.video_messages import LeftOut, VideoDecoder
 from mvcodec.container.recorded_pictures import RecordedPicture
 from mvcodec.errors import InputError, MvCodecWarning
@@ -71,7 +71,7 @@ class LiveCamera:
     def __init__(self, address: str, changed: threading.Condition, patience_s: float = _OPEN_S) -> None:
         self.address = address
         self.waiting: deque[LivePicture] = deque()
-        self.clock = ArrivalClock()
+        self.clock = ArrivalClock(HELD_BACK)
         self.connection = self.left_out = 0
         self.problem = ""
         self.hopeless = False
@@ -125,7 +125,7 @@ class LiveCamera:
                 raise InputError(self.address, "no video", "a camera")
             with self._changed:
                 self.connection += 1
-                self.clock = ArrivalClock()
+                self.clock = ArrivalClock(HELD_BACK)
             self.problem = ""
             for stamp_ns, frame in self._pictures(container, stream):
                 self._add(LivePicture(stamp_ns, self.connection, frame))

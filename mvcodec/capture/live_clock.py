@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Sequence
 
 _WINDOW = 1000
 """Pictures after which an early arrival is forgotten, since the sender's clock runs at a speed of its own."""
+
+HELD_BACK = 2
+"""Pictures inside FFmpeg: its demuxer and its parser know the end of one by the start of the next."""
 
 AGREE_NS = 2_000_000_000
 """Clocks of senders that are no further apart are taken as one; a network and its buffers delay by less."""
@@ -16,25 +20,34 @@ class ArrivalClock:
     """Follows the least delay between a picture's stamp and its arrival.
 
     The least one: what comes later was delayed on the way, which says nothing of when it was taken.
+
+    Args:
+        held_back: pictures that come when the next ones begin, as `HELD_BACK` says. Where a connection
+            ends they come at once, that much sooner than all before them, so that the last ones never count.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, held_back: int = 0) -> None:
         self.began_s = time.monotonic()
+        self._held_back = held_back
+        self._delays: deque[int] = deque()
         self._count = 0
         self._now: int | None = None
         self._before: int | None = None
 
     def push(self, stamp_ns: int, arrival_ns: int) -> None:
         """Take a picture into account."""
+        self._delays.append(arrival_ns - stamp_ns)
+        if len(self._delays) <= self._held_back:
+            return
         if self._count % _WINDOW == 0:
             self._before, self._now = self._now, None
         self._count += 1
-        delay = arrival_ns - stamp_ns
+        delay = self._delays.popleft()
         self._now = delay if self._now is None else min(self._now, delay)
 
     @property
     def shift_ns(self) -> int | None:
-        """What makes a time of day of a stamp; None before the first picture."""
+        """What makes a time of day of a stamp; None before the first picture that counts."""
         known = [delay for delay in (self._now, self._before) if delay is not None]
         return min(known, default=None)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from itertools import chain
+from itertools import chain, product
 from typing import BinaryIO
 
 import numpy as np
@@ -20,6 +20,7 @@ from mvcodec.capture.recorded_calibration import NotRectified, array_calibration
 from mvcodec.capture.recorded_maps import DepthDecoder, Depths
 from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.capture.selection import select_real
+from mvcodec.capture.split import cut_out, view_size
 from mvcodec.capture.timing import rate_of_times
 from mvcodec.capture.topic_pictures import NOT_AFTER, TopicPictures, WaitingPicture
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
@@ -76,15 +77,10 @@ class Recording:
     ) -> None:
         self.name = name
         self._settings, self._on_damage = settings, on_damage
-        rows, cols = settings.grid
-        self._axes = select_real(settings.real, rows, cols)
-        self._topics = {
-            settings.topics[row][col]: (row, col) for row in self._axes[0] for col in self._axes[1]
-        }
+        self._topics = settings.real_topics()
+        rows, real = len(settings.topics), set(self._topics.values())
         for row, names in enumerate(settings.depth_topics or ()):
-            self._topics |= {
-                name: (rows + row, col) for col, name in enumerate(names) if self._is_real(row, col)
-            }
+            self._topics |= {name: (rows + row, col) for col, name in enumerate(names) if (row, col) in real}
         self._names = {position: topic for topic, position in self._topics.items()}
         parts = files if isinstance(files, Sequence) else [files]
         self._reader = RecordingReader(parts, name, list(self._topics), settings.clock, limits, on_damage)
@@ -117,7 +113,8 @@ class Recording:
         self.calibration_note = ""
         self._first = self._read_first()
         self.array = self._make_array(self._first[0])
-        self.cameras = recorded_cameras(self._reader.rig or RecordedRig(), self._frames)
+        rig = self._reader.rig if settings.split == (1, 1) else None
+        self.cameras = recorded_cameras(rig or RecordedRig(), self._frames)
         self._reader.rig = None
         if settings.depth_topics is not None and not self.array.calibration.given:
             raise InputError(
@@ -131,7 +128,8 @@ class Recording:
 
     def frame_sets(self) -> Iterator[FrameSet]:
         """Frame sets in order, numbered from 0; warnings at the end count what was dropped."""
-        array, rows = self.array, self._settings.grid[0]
+        array, rows, real = self.array, len(self._settings.topics), set(self.array.real)
+        size, (down, across) = (array.width, array.height), self._settings.split
         for index, (time_ns, found) in enumerate(chain(self._first, self._sets)):
             pictures: dict[Position, Picture] = {}
             given = {}
@@ -142,18 +140,17 @@ class Recording:
                     check_map_size(depths, array, label)
                     given[row - rows, col] = disparity_of_depth(depths, array)
                     continue
-                if values.shape != (array.height, array.width, 3):
-                    size = f"a picture of {values.shape[1]}x{values.shape[0]} px"
-                    raise InputError(
-                        label, size, f"{array.width}x{array.height} px as in the first frame set"
-                    )
-                pictures[row, col] = np.asarray(values, np.uint8)
+                if values.shape != (array.height * down, array.width * across, 3):
+                    found_size = f"a picture of {values.shape[1]}x{values.shape[0]} px"
+                    expected = f"{array.width * across}x{array.height * down} px as in the first frame set"
+                    raise InputError(label, found_size, expected)
+                picture = np.asarray(values, np.uint8)
+                for inner_row, inner_col in product(range(down), range(across)):
+                    if (place := (row * down + inner_row, col * across + inner_col)) in real:
+                        pictures[place] = cut_out(picture, inner_row, inner_col, size)
             self._count = index + 1
-            yield FrameSet(index, time_ns, pictures, given)
+            yield FrameSet(index, time_ns, dict(sorted(pictures.items())), given)
         self._tell_end()
-
-    def _is_real(self, row: int, col: int) -> bool:
-        return row in self._axes[0] and col in self._axes[1]
 
     def _warn(self, text: str) -> None:
         warnings.warn(f"{self.name}: {text}", MvCodecWarning, stacklevel=3)
@@ -218,6 +215,8 @@ class Recording:
     def _make_array(self, first: _Found) -> CameraArray:
         rows, cols = self._settings.grid
         height, width = next(iter(first[1].values())).shape[:2]
+        width, height = view_size((width, height), *self._settings.split, self.name)
+        axes = select_real(self._settings.real, rows, cols)
         calibration, rho = self._calibration(width, height)
         return CameraArray(
             rows=rows,
@@ -225,8 +224,8 @@ class Recording:
             width=width,
             height=height,
             fps=self._fps(),
-            real_rows=self._axes[0],
-            real_cols=self._axes[1],
+            real_rows=axes[0],
+            real_cols=axes[1],
             calibration=calibration,
             rho=rho,
             name=self.name,
@@ -237,6 +236,8 @@ class Recording:
         if self._settings.calibration is not None:
             return self._settings.calibration, 1.0
         self.calibration_note = "no calibration given"
+        if self._settings.split != (1, 1):  # what is recorded of cameras does not say of which view
+            return Calibration.nominal(width, height), 1.0
         try:
             assert self._reader.rig is not None
             frames = self._reader.rig.tell_apart(
@@ -255,7 +256,7 @@ class Recording:
         """(time of the first camera, pictures) of every frame set that is whole."""
         for message in self._reader.pictures():
             camera = self._topics[message.topic]
-            if camera[0] < self._settings.grid[0]:
+            if camera[0] < len(self._settings.topics):
                 self._frames.setdefault(camera, message.frame_id)
             try:
                 self._wait(camera, self._pictures[camera].push(message))

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import get_args
 
-from mvcodec.array import Calibration
+from mvcodec.array import Calibration, Position
 from mvcodec.capture.reading import used_bits
+from mvcodec.capture.selection import select_real
 from mvcodec.capture.timing import nominal_fps, tolerance
 from mvcodec.container.recorded_pictures import Clock
 from mvcodec.errors import SettingError
@@ -22,12 +23,13 @@ class RecordingSettings:
     """How a recording is read.
 
     Attributes:
-        topics: of every view of the grid, row by row.
+        topics: of every view of the grid, or of every `split` views, row by row.
         real: which cameras are real, as `select_real` reads it.
         calibration: of all cameras; None: the recording's own, or nominal.
         offsets_ms: what is added to a topic's times.
         fps, tolerance_ms, clock, bits: explained by their fields.
         depth_topics: of the depth of every view, rows as `topics` has them; None: there is none.
+        split: (rows, cols) of views in each picture.
 
     Raises:
         SettingError: the grid is not one, names a topic twice, or a number is out of range.
@@ -46,6 +48,7 @@ class RecordingSettings:
     offsets_ms: Mapping[str, float] = field(default_factory=dict)
     bits: int | None = used_bits()
     depth_topics: TopicGrid | None = None
+    split: tuple[int, int] = (1, 1)
 
     def __post_init__(self) -> None:
         widths = {len(row) for row in self.topics}
@@ -59,14 +62,28 @@ class RecordingSettings:
                     "depth_topics", found, f"rows of topics as `topics` has them: {len(names)}"
                 )
             names += chain.from_iterable(self.depth_topics)
+        if min(self.split) < 1:
+            raise SettingError("split", f"{self.split[0]}x{self.split[1]}", "RxC, at least 1x1")
+        if self.depth_topics is not None and self.split != (1, 1):
+            raise SettingError("split", "with depth_topics", "a topic for each view")
         if len(set(names)) != len(names):
             raise SettingError("topics", "a topic twice", "each topic once")
         check_settings(self)
 
     @property
     def grid(self) -> tuple[int, int]:
-        """(rows, cols)."""
-        return len(self.topics), len(self.topics[0])
+        """(rows, cols) of views."""
+        return len(self.topics) * self.split[0], len(self.topics[0]) * self.split[1]
+
+    def real_topics(self) -> dict[str, Position]:
+        """The topics with real cameras in their pictures, each with its place in `topics`.
+
+        Raises:
+            SettingError: `real` doesn't fit the grid.
+        """
+        axes = zip(select_real(self.real, *self.grid), self.split, strict=True)
+        rows, cols = (dict.fromkeys(place // held for place in axis) for axis, held in axes)
+        return {self.topics[row][col]: (row, col) for row in rows for col in cols}
 
     def offsets_ns(self, topics: Sequence[str]) -> dict[str, int]:
         """Offsets by topic.

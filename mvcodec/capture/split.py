@@ -29,18 +29,34 @@ def quilt_layout(path: Path) -> tuple[int, int] | None:
     return None if found is None else (int(found[2]), int(found[1]))
 
 
+def view_size(size: tuple[int, int], rows: int, cols: int, name: str) -> tuple[int, int]:
+    """(width, height) of each of rows x cols views in a picture of a size, px.
+
+    Raises:
+        InputError: the picture cannot be divided; `name` says where it comes from.
+    """
+    width, height = size
+    if width % cols or height % rows:
+        expected = f"a width that {cols} and a height that {rows} divide, for {rows}x{cols} views"
+        raise InputError(name, f"{width}x{height} px", expected)
+    return width // cols, height // rows
+
+
+def cut_out(picture: Picture, row: int, col: int, size: tuple[int, int]) -> Picture:
+    """The view at a place of a picture that holds several, each of the size (width, height) px."""
+    width, height = size
+    return np.ascontiguousarray(picture[row * height : (row + 1) * height, col * width : (col + 1) * width])
+
+
 def split_views(reader: ViewReader, rows: int, cols: int) -> dict[Position, ViewReader]:
     """The views of a file, by their place in its pictures.
 
     Raises:
         InputError: its pictures cannot be divided.
     """
-    width, height = reader.size
-    if width % cols or height % rows:
-        expected = f"a width that {cols} and a height that {rows} divide, for {rows}x{cols} views"
-        raise InputError(reader.path, f"{width}x{height} px", expected)
+    size = view_size(reader.size, rows, cols, str(reader.path))
     whole = _SharedFile(reader)
-    return {(row, col): _Tile(whole, row, col, rows, cols) for row in range(rows) for col in range(cols)}
+    return {(row, col): _Tile(whole, row, col, size) for row in range(rows) for col in range(cols)}
 
 
 def quilt_views(reader: ViewReader, rows: int, cols: int) -> dict[Position, ViewReader]:
@@ -105,21 +121,13 @@ class _SharedFile:
 class _Tile:
     """One view of a file of several."""
 
-    def __init__(self, whole: _SharedFile, row: int, col: int, rows: int, cols: int) -> None:
-        self._whole = whole
-        width, height = whole.reader.size
-        self.size = width // cols, height // rows
-        self._top, self._left = row * self.size[1], col * self.size[0]
+    def __init__(self, whole: _SharedFile, row: int, col: int, size: tuple[int, int]) -> None:
+        self._whole, self._place, self.size = whole, (row, col), size
         self.path, self.count = whole.reader.path, whole.reader.count
         self.times_ns, self.fps, self.early = whole.reader.times_ns, whole.reader.fps, whole.reader.early
         self.notes = whole.reader.notes if (row, col) == (0, 0) else ()
 
     def readable(self, frames: Sequence[int], on_unreadable: OnUnreadable | None) -> Iterator[Picture | None]:
         """See ViewReader."""
-        width, height = self.size
         for picture in self._whole.pictures(frames, on_unreadable):
-            if picture is None:
-                yield None
-            else:
-                rows = slice(self._top, self._top + height)
-                yield np.ascontiguousarray(picture[rows, self._left : self._left + width])
+            yield None if picture is None else cut_out(picture, *self._place, self.size)

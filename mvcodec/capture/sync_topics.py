@@ -9,7 +9,6 @@ from itertools import islice
 
 from mvcodec.capture.recording import Recording
 from mvcodec.capture.recording_settings import RecordingSettings
-from mvcodec.capture.selection import select_real
 from mvcodec.capture.sync import MAX_PICTURES, Motion, motion_of
 from mvcodec.capture.sync_views import offsets_by_motion
 from mvcodec.errors import MvCodecWarning
@@ -26,13 +25,13 @@ def with_offsets(
     Raises:
         InputError: nothing tells how far a camera's clock is apart.
     """
-    rows, cols = settings.grid
-    real = select_real(settings.real, rows, cols)
-    topics = [settings.topics[row][col] for row in real[0] for col in real[1]]
+    topics = list(settings.real_topics())
     signals: dict[str, Motion] = {}
     steps: dict[str, Sequence[int]] = {}
     for topic in topics:
-        alone = replace(settings, topics=((topic,),), real="corners", depth_topics=None, offsets_ms={})
+        alone = replace(
+            settings, topics=((topic,),), real="corners", depth_topics=None, offsets_ms={}, split=(1, 1)
+        )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MvCodecWarning)  # told when all are read
             frames = list(islice(opened(alone).frame_sets(), MAX_PICTURES))

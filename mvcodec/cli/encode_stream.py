@@ -170,13 +170,11 @@ def _opened(arguments: argparse.Namespace) -> Iterator[Recording | LiveCameras]:
         with live_cameras(arguments) as cameras:
             yield cameras
         return
-    if arguments.split is not None:
-        raise SettingError("split", "with a recording", "an input of video or picture files")
     if arguments.sync == "audio":
         raise SettingError("sync", "audio with a recording", "motion: a recording's topics have no sound")
-    timing = timing_of(arguments)
+    timing, split = timing_of(arguments), arguments.split or (1, 1)
     settings = RecordingSettings(
-        topics=_topic_grid("--topics", arguments.topics, arguments.grid),
+        topics=_topic_grid("--topics", arguments.topics, arguments.grid, split),
         real=arguments.real,
         fps=timing.fps,
         tolerance_ms=timing.tolerance_ms,
@@ -185,6 +183,7 @@ def _opened(arguments: argparse.Namespace) -> Iterator[Recording | LiveCameras]:
         offsets_ms=timing.offsets_ms,
         bits=arguments.bits,
         depth_topics=_depth_grid(arguments),
+        split=split,
     )
     on_damage = reading_of(arguments).on_unreadable
     paths: list[Path] = arguments.input
@@ -218,7 +217,9 @@ def _depth_grid(arguments: argparse.Namespace) -> TopicGrid | None:
     return _topic_grid("--depth-topics", arguments.depth_topics, arguments.grid)
 
 
-def _topic_grid(option: str, text: str | None, grid: tuple[int, int] | None) -> TopicGrid:
+def _topic_grid(
+    option: str, text: str | None, grid: tuple[int, int] | None, split: tuple[int, int] = (1, 1)
+) -> TopicGrid:
     if text is None:
         raise SettingError(option, "nothing", "the topic of every view, such as '/a,/b;/c,/d'")
     rows = tuple(tuple(topic.strip() for topic in row.split(",")) for row in text.strip(";").split(";"))
@@ -227,9 +228,10 @@ def _topic_grid(option: str, text: str | None, grid: tuple[int, int] | None) -> 
     if grid is None:
         return rows
     names = [name for row in rows for name in row]
-    if len(names) != grid[0] * grid[1]:
-        raise SettingError(option, f"{len(names)} topics", f"{grid[0]}x{grid[1]} as --grid says")
-    cols = grid[1]
+    cols = grid[1] // split[1]
+    if len(names) * split[0] * split[1] != grid[0] * grid[1] or grid[0] % split[0] or grid[1] % split[1]:
+        each = f" of {split[0]}x{split[1]} views each" * (split != (1, 1))
+        raise SettingError(option, f"{len(names)} topics{each}", f"{grid[0]}x{grid[1]} views as --grid says")
     return tuple(tuple(names[at : at + cols]) for at in range(0, len(names), cols))
 
 

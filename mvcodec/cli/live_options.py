@@ -49,9 +49,8 @@ def live_cameras(arguments: argparse.Namespace) -> Iterator[LiveCameras]:
         InputError: nothing comes.
     """
     for option in ("topics", "depth_topics", "split", "bits", "sync"):
-        found = getattr(arguments, option)
-        if found is not None:
-            raise SettingError(option, found, "no such option with live cameras")
+        if getattr(arguments, option) is not None:
+            raise SettingError(option, "with live cameras", "no such option")
     count = len(arguments.input)
     if arguments.grid is None and count > 1:
         raise SettingError("--grid", "nothing", f"RxC of {count} cameras in row order")

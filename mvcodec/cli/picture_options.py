@@ -19,7 +19,7 @@ def add_picture_options(parser: argparse.ArgumentParser) -> None:
         "--split",
         type=pair_of_sizes,
         metavar="RxC",
-        help="views in each picture of the files: 1x2 side by side, 2x1 top and bottom, or a mosaic"
+        help="views in each picture of the files or topics: 1x2 side by side, 2x1 top and bottom, or a mosaic"
         " (default: 1x1, and what a quilt's name says)",
     )
     add_on_error(parser, "stop", "at a picture that cannot be read: leave its frame set out, or stop")
