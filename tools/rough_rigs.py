@@ -6,6 +6,7 @@ import argparse
 import json
 import resource
 import tempfile
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -20,6 +21,8 @@ from scipy.spatial.transform import Rotation
 import mvcodec
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.capture import resolve_frames
+from mvcodec.capture.sync import motion_of
+from mvcodec.capture.sync_views import offsets_by_motion
 from mvcodec.evaluation.metrics import psnr
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.kernels.raycast import straightened
@@ -34,22 +37,27 @@ from mvcodec.scenes.scene import RoomScene, SceneSettings
 
 Vectors = NDArray[np.float64]
 FRAMES = 3
+MOVING_FRAMES, STEP_NS = 12, 33_333_333
+"""What `--sync` looks at, as `mvcodec rectify --sync motion` would."""
 VIEWS = {(2, 2): ((0.5, 0.5), (0.5, 0.0), (0.0, 0.5)), (3, 3): ((0.5, 0.5), (1.5, 0.5), (1.0, 1.5))}
 """Virtual views that are looked at, in steps of each grid."""
 
 
 class SceneSource:
-    """An ArraySource over a scene, all of whose cameras are real. Each frame is rendered once."""
+    """An ArraySource over a scene, all of whose cameras are real. Each frame is rendered once.
+
+    `late` says how many pictures of which cameras are left out at the beginning.
+    """
 
     first_frame = 0
     listed_real = None
     has_given = False
 
-    def __init__(self, scene: RoomScene | RoughScene) -> None:
+    def __init__(self, scene: RoomScene | RoughScene, late: Mapping[Position, int] | None = None) -> None:
         rows, cols = tuple(range(scene.array.rows)), tuple(range(scene.array.cols))
         self.array: CameraArray = replace(scene.array, real_rows=rows, real_cols=cols)
         self.name, self.frame_count = scene.array.name, scene.frame_count
-        self._scene = scene
+        self._scene, self._late = scene, dict(late or {})
         self._rendered: dict[tuple[Position, int], Picture] = {}
 
     def frame_sets(
@@ -68,8 +76,11 @@ class SceneSource:
 
     def _picture(self, view: Position, frame: int) -> Picture:
         if (view, frame) not in self._rendered:
-            self._rendered[view, frame] = self._scene.render(Viewpoint(*view), frame)[0]
+            self._rendered[view, frame] = self._shown(view, frame)
         return self._rendered[view, frame]
+
+    def _shown(self, view: Position, frame: int) -> Picture:
+        return self._scene.render(Viewpoint(*view), frame + self._late.get(view, 0))[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,10 +112,26 @@ def angle_errors_deg(rig: Rig, truth: Mapping[Position, RoughCamera]) -> Vectors
     return np.asarray(np.degrees((found * common * true.inv()).magnitude()))
 
 
-def measure(seed: int, grid: tuple[int, int], flaws: tuple[str, ...], ideal_db: float) -> Measured:
-    """One rough rig."""
+def late_by_motion(scene: RoughScene) -> dict[Position, int]:
+    """How many frames each camera is later than most, by what moves."""
+    times = [number * STEP_NS for number in range(MOVING_FRAMES)]
+    cameras = scene.array.positions
+    motions = {
+        at: motion_of((scene.render(Viewpoint(*at), n)[0] for n in range(MOVING_FRAMES)), times)
+        for at in cameras
+    }
+    offsets = offsets_by_motion(motions, dict.fromkeys(cameras, times), {at: str(at) for at in cameras})
+    late = {at: -round(offset / STEP_NS) for at, offset in offsets.items()}
+    usual = Counter(late.values()).most_common(1)[0][0]
+    return {at: frames - usual for at, frames in late.items()}
+
+
+def measure(
+    seed: int, grid: tuple[int, int], flaws: tuple[str, ...], ideal_db: float, *, sync: bool = False
+) -> Measured:
+    """One rough rig; with `sync`, cameras are put in step first."""
     scene = RoughScene.of(SceneSettings(grid, FRAMES), RoughRigSettings(seed, flaws))
-    source = SceneSource(scene)
+    source = SceneSource(scene, late_by_motion(scene) if sync else None)
     list(source.frame_sets())
     before = resource.getrusage(resource.RUSAGE_SELF)
     found = calibrate_from_scene(source, range(FRAMES))
@@ -208,6 +235,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--grids", nargs="+", default=["2x2", "3x3"])
     parser.add_argument("--flaws", nargs="+", default=list(FLAWS), choices=FLAWS)
+    parser.add_argument("--sync", action="store_true", help="put cameras in step by what moves")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     rows: list[dict[str, Any]] = []
@@ -215,7 +243,7 @@ def main() -> None:
         grid = int(text.split("x")[0]), int(text.split("x")[1])
         best = ideal_db(grid)
         for seed in range(1, arguments.seeds + 1):
-            measured = measure(seed, grid, tuple(arguments.flaws), best)
+            measured = measure(seed, grid, tuple(arguments.flaws), best, sync=arguments.sync)
             rows.append(asdict(measured))
             if not arguments.json:
                 print(

@@ -27,10 +27,15 @@ LEAST_LIKENESS = 0.4
 
 AUDIO_HZ = 8000
 _MAX_SOUND_S = 600
-_FLOW_SIZE = (160, 120)
+FLOW_SIZE = (160, 120)
+"""Of the copies that motion is told from, (width, height) px."""
+
 _BLUR_PX = 2.0
 _STILL_LEVELS = 0.25
 """Grey levels that change on the average where most does: less is noise."""
+
+_SURE_FLOW = 0.8
+"""Correlation below which a flow counts for nothing: cameras that stand still have one too, of noise."""
 
 _CHANGE_GRID = (4, 3)
 
@@ -60,14 +65,14 @@ class Motion:
 
 def motion_of(pictures: Iterable[Picture | None], times_ns: Sequence[int]) -> Motion:
     """The motion in pictures, uint8 (H, W, 3), at their times."""
-    window = cv2.createHanningWindow(_FLOW_SIZE, cv2.CV_32F)
+    window = cv2.createHanningWindow(FLOW_SIZE, cv2.CV_32F)
     before: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
     times, change, flow = [], [], []
     at_ns = 0
     for picture, time_ns in zip(pictures, times_ns, strict=False):
         if picture is None:
             continue
-        grey = cv2.cvtColor(cv2.resize(picture, _FLOW_SIZE, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY)
+        grey = cv2.cvtColor(cv2.resize(picture, FLOW_SIZE, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY)
         sharp = grey.astype(np.float32)
         smooth = np.asarray(cv2.GaussianBlur(sharp, (0, 0), _BLUR_PX), np.float32)
         if before is not None:
@@ -81,20 +86,49 @@ def motion_of(pictures: Iterable[Picture | None], times_ns: Sequence[int]) -> Mo
     return Motion(np.array(times), np.array(change, np.float32), np.array(flow, np.float32))
 
 
+@dataclass(frozen=True, slots=True)
+class Lag:
+    """How far one camera's motion lies after another's.
+
+    Attributes:
+        steps: from the beginning of the first signal to that of the other, in steps of the finer one.
+        likeness: correlation there, 0..1.
+        unmoved: correlation at no lag at all.
+        weighed: `likeness`, less where little is in common.
+    """
+
+    steps: float
+    likeness: float
+    unmoved: float
+    weighed: float
+
+
 def motion_offset_ns(first: Motion, other: Motion) -> tuple[float, float]:
     """(what to add to the other camera's times, ns; correlation 0..1).
 
-    Signals are put on one grid of the finer camera's steps; the lag with the highest correlation wins, to
-    parts of a step by a parabola through it and its neighbours. Where the clocks begin counts for nothing.
+    Where the clocks begin counts for nothing; see `lag_of`.
     """
-    step = min(float(np.median(np.diff(each.times_ns))) for each in (first, other))
-    found = [_lag(first, other, kind, step) for kind in ("flow", "change")]
-    lag, likeness, _ = max(found, key=lambda item: item[2])
-    return float(first.times_ns[0] - other.times_ns[0]) + lag * step, likeness
+    lag = lag_of(first, other)
+    shift = lag.steps * _finer_step(first, other)
+    return float(first.times_ns[0] - other.times_ns[0]) + shift, lag.likeness
 
 
-def _lag(first: Motion, other: Motion, kind: str, step: float) -> tuple[float, float, float]:
-    """Steps from the beginning of the first signal to that of the other; correlation; the same weighed."""
+def lag_of(first: Motion, other: Motion) -> Lag:
+    """The lag of two motions.
+
+    Signals are put on one grid of the finer camera's steps; the lag with the highest correlation wins, to
+    parts of a step by a parabola through it and its neighbours.
+    """
+    step = _finer_step(first, other)
+    flow, change = (_lag(first, other, kind, step) for kind in ("flow", "change"))
+    return flow if flow.likeness >= _SURE_FLOW and flow.weighed > change.weighed else change
+
+
+def _finer_step(first: Motion, other: Motion) -> float:
+    return min(float(np.median(np.diff(each.times_ns))) for each in (first, other))
+
+
+def _lag(first: Motion, other: Motion, kind: str, step: float) -> Lag:
     ours, theirs = (_on_grid(each.times_ns, getattr(each, kind), step) for each in (first, other))
     least = max(MIN_STEPS, min(len(ours), len(theirs)) // 2)
     lags = range(least - len(theirs), len(ours) - least + 1)
@@ -103,7 +137,8 @@ def _lag(first: Motion, other: Motion, kind: str, step: float) -> tuple[float, f
     common = np.array([min(len(ours), len(theirs) + lag) - max(lag, 0) for lag in lags])
     weighed = likeness * np.sqrt(common / common.max())
     best = int(np.argmax(weighed))
-    return lags[best] + _peak(likeness, best), float(likeness[best]), float(weighed[best])
+    unmoved = _likeness(ours, theirs, 0)
+    return Lag(lags[best] + _peak(likeness, best), float(likeness[best]), unmoved, float(weighed[best]))
 
 
 def _on_grid(times_ns: NDArray[np.float64], signal: Signal, step: float) -> Signal:

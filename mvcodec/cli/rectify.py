@@ -18,6 +18,8 @@ from mvcodec.cli.paths import (
     local_path,
 )
 from mvcodec.cli.progress import progress
+from mvcodec.cli.rig_option import tell_delays
+from mvcodec.cli.time_options import add_time_options, timing_of
 from mvcodec.errors import SettingError
 from mvcodec.evaluation.rig_report import rig_report
 from mvcodec.frames import FrameSet
@@ -107,6 +109,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--report", type=local_path, metavar="rig.html", help="write a page with figures and pictures"
     )
     add_frames(parser, "frames of the input to use")
+    add_time_options(parser)
     add_overwrite(parser)
     add_output_options(parser, "print the rig as JSON")
 
@@ -121,8 +124,10 @@ def run(arguments: argparse.Namespace) -> None:
     else:
         names = rf"{re.escape(RIG_NAME)}|{ARRAY_NAMES}"
         check_folder_target(output, names, overwrite=arguments.overwrite)
-    source = open_input(arguments.input, grid=arguments.grid, real="all")
+    timing = timing_of(arguments)
+    source = open_input(arguments.input, grid=arguments.grid, real="all", timing=timing)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
+    tell_delays(source, chosen, arguments)
     found = _calibrated(source, chosen, arguments)
     text = rig_text(found.rig)
     if output.suffix.lower() == ".json":

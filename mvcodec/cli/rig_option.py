@@ -15,10 +15,12 @@ from mvcodec.capture.recording import Recording
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet, Picture
 from mvcodec.rigs.calibration import calibrate_from_scene
+from mvcodec.rigs.delay import find_delays
 from mvcodec.rigs.look import look_at
 from mvcodec.rigs.recorded import recorded_rig
 from mvcodec.rigs.remap import RectifiedSource, Rectifier, rectified
 from mvcodec.rigs.rig import Rig, read_rig
+from mvcodec.stream import view_name
 
 AUTO, RECORDED = "auto", "recorded"
 
@@ -41,10 +43,32 @@ def add_rig(parser: argparse.ArgumentParser) -> None:
 def rectified_source(source: ArraySource, chosen: range, arguments: argparse.Namespace) -> ArraySource:
     """The input itself, or rectified as ``--rig`` says; checked by a look at its first frame set."""
     if arguments.rig is not None:
+        tell_delays(source, chosen, arguments, strict=arguments.strict)
         source = RectifiedSource(source, Rectifier(_rig_of(source, chosen, arguments)))
     first = next(iter(source.frame_sets(slice(chosen.start, chosen.start + 1))))
     look(source.array, first.pictures, source.name, strict=arguments.strict)
     return source
+
+
+def tell_delays(
+    source: ArraySource, chosen: range, arguments: argparse.Namespace, *, strict: bool = False
+) -> None:
+    """Warn of cameras that are late, where nothing was asked about their time.
+
+    Raises:
+        InputError: one is, and `strict` is set.
+    """
+    if arguments.sync is not None or arguments.offset:
+        return
+    for delay in find_delays(source, chosen):
+        size = "one frame" if abs(delay.frames) == 1 else f"{abs(delay.frames)} frames"
+        word = "late" if delay.frames > 0 else "early"
+        name = view_name(delay.camera)
+        text = f"camera {name} is {size} {word} against the others"
+        mends = f"--sync motion, or --offset {name}={delay.offset_ms:.1f}"
+        if strict:
+            raise InputError(source.name, text, f"cameras in step: {mends}")
+        warnings.warn(f"{source.name}: {text}; what mends that: {mends}", MvCodecWarning, stacklevel=2)
 
 
 def _rig_of(source: ArraySource, chosen: range, arguments: argparse.Namespace) -> Rig:
