@@ -10,7 +10,8 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils, types
+from numba import types  # Numba as a whole first: half of it fails while another thread imports it
+from numba.core import cgutils
 from numba.extending import intrinsic, models, register_model
 
 LANES = 64

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba.core import types
+from numba import types  # Numba as a whole first: half of it fails while another thread imports it
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 

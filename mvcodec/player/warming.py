@@ -10,7 +10,7 @@ import numpy as np
 from mvcodec.array import Calibration, CameraArray, Viewpoint
 from mvcodec.decoding.derived_maps import derive_map
 from mvcodec.frames import DecodedSet, DisparityMap
-from mvcodec.kernels.compiled_code import on_first_compilation
+from mvcodec.kernels import on_first_compilation
 from mvcodec.stream import map_cameras
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.video.codec import Planes
