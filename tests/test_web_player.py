@@ -119,6 +119,21 @@ def test_dragging_looks_around_and_a_click_plays(page: Page) -> None:
     waits_for(page, "!shown.isPlaying")
 
 
+def test_a_picture_that_is_held_gets_all_detail_when_it_is_let_go(page: Page) -> None:
+    page.evaluate("document.querySelector('mvcodec-player').settled()")
+    page.mouse.move(480, 250)
+    page.mouse.down()
+    page.mouse.move(400, 250, steps=4)
+    waits_for(page, "shown.view.col > 1.05")
+    page.evaluate("""() => {
+        window.heldUntil = performance.now() + 500;
+        document.querySelector("mvcodec-player").settled().then(() => (window.stoodAt = performance.now()));
+    }""")
+    page.wait_for_function("() => performance.now() > window.heldUntil")
+    page.mouse.up()
+    page.wait_for_function("() => window.stoodAt > window.heldUntil")
+
+
 def test_the_wheel_moves_ahead_and_holes_stay_few(page: Page) -> None:
     page.mouse.move(480, 250)
     for _ in range(20):
