@@ -144,17 +144,22 @@ def test_points_are_exported_as_ply_and_as_point_clouds(tmp_path: Path) -> None:
     with Encoder(ARRAY, config()) as encoder, McapWriter(coded) as writer:
         for index in range(3):
             writer.push(encoder.push(frame_set(ARRAY, index)))
-    succeeds("export-points", coded, tmp_path / "x.ply", "--max-depth", "20")
+    told = succeeds("export-points", coded, tmp_path / "x.ply", "--max-depth", "20")
     head, body = (tmp_path / "x.ply").read_bytes().split(b"end_header\n")
     count = int(head.split(b"element vertex ")[1].split()[0])
     assert len(body) == 15 * count
+    assert told == f"{tmp_path / 'x.ply'}: {count} points of frame 0\n"
     places = np.frombuffer(body, np.dtype([("place", "<f4", 3), ("colour", "u1", 3)]))["place"]
     assert 0 < places[:, 0].min() <= places[:, 0].max() <= 20
-    succeeds("export-points", coded, tmp_path / "points.mcap", "--max-depth", "20", "--frames", "1:3")
+    some = ("--max-depth", "20", "--frames", "1:3")
+    told = succeeds("export-points", coded, tmp_path / "points.mcap", *some)
     clouds = [
         PointCloud.FromString(message.data)
         for _, _, message in make_reader(io.BytesIO((tmp_path / "points.mcap").read_bytes())).iter_messages()
     ]
+    total = sum(len(cloud.data) // cloud.point_stride for cloud in clouds)
+    assert told == f"{tmp_path / 'points.mcap'}: {total} points of 2 frames\n"
+    assert succeeds("export-points", coded, tmp_path / "points.mcap", *some, "-y", "--quiet") == ""
     assert [cloud.timestamp.ToNanoseconds() for cloud in clouds] == [100_000_000, 200_000_000]
     cloud = clouds[0]
     assert (cloud.frame_id, cloud.point_stride) == ("rig", 16)

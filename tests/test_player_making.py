@@ -32,7 +32,7 @@ class Noting:
         self._notes, self._let = notes, let
 
     def prepare(self, decoded: DecodedSet, _viewpoint: Viewpoint) -> None:
-        assert self._let.wait(10)
+        self._let.wait()
         self._notes.append(("prepared", decoded.index, self))
 
     def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
@@ -75,7 +75,7 @@ def test_the_next_frame_is_prepared_once_and_waited_for(
     next_one.join(0.2)
     assert next_one.is_alive()
     let.set()
-    next_one.join(10)
+    next_one.join()
     assert [note[:2] for note in notes] == [("rendered", 0), ("prepared", 1), ("rendered", 1)]
     assert notes[1][2] is notes[2][2]
 

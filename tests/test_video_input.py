@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from array_files import picture_of, save_planes
 from numpy.typing import NDArray
+from timed_videos import write_video
 
 from mvcodec.capture import open_input
 from mvcodec.capture.video_input import VideoView
@@ -183,3 +184,22 @@ def test_what_a_file_says_and_is_left_aside_is_told(tmp_path: Path) -> None:
     notes = VideoView(tmp_path / "a.mkv").notes
     assert any("its pixels are 4:3, not square" in note for note in notes)
     assert any("it has 2 videos: the first one is taken" in note for note in notes)
+
+
+def encrypted(source: Path, target: Path) -> Path:
+    """The same MP4 file with Common Encryption."""
+    key = "00112233445566778899aabbccddeeff"
+    options = {"encryption_scheme": "cenc-aes-ctr", "encryption_key": key, "encryption_kid": key}
+    with av.open(str(source)) as plain, av.open(str(target), "w", format="mp4", options=options) as out:
+        stream = out.add_stream_from_template(plain.streams.video[0])
+        for packet in plain.demux(plain.streams.video[0]):
+            if packet.size:
+                packet.stream = stream
+                out.mux(packet)
+    return target
+
+
+def test_encrypted_files_are_called_so(tmp_path: Path) -> None:
+    plain = write_video(tmp_path / "v.mp4", range(3))
+    with pytest.raises(InputError, match=r"no frames \(3 are left out: they are encrypted\)"):
+        VideoView(encrypted(plain, tmp_path / "e.mp4"))

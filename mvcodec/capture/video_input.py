@@ -70,7 +70,7 @@ class VideoView:
                 times = read_times(container, _video_stream(container, path))
             with _opened(path) as container:
                 stream = _video_stream(container, path)
-                first = next(container.decode(stream), None)
+                first = next(container.decode(stream), None) if times.stamps else None
                 self.notes = _stated_oddities(container, stream)
         except (av.error.FFmpegError, OSError) as error:
             raise _unreadable(path, error) from None

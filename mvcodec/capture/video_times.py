@@ -26,6 +26,7 @@ _BY_DECODING_TIME = frozenset({"avi"})
 
 _BESIDE_GAP = "an AVI file with B-pictures does not say when those beside a gap are shown"
 _DAMAGED = "damaged"
+_ENCRYPTED = "they are encrypted"
 _SAME_TIME = "they have the time of the picture before"
 _UNKNOWN_TIME = "how many pictures are missing before them is unknown, since the stream has no times"
 
@@ -214,6 +215,9 @@ def _reason(
 ) -> str | None:
     """Why a packet gives no whole picture. The filter takes the packet's data away."""
     pts = packet.pts
+    if packet.has_sidedata("encryption_info"):
+        whole.lose(BUILDS_ON_LOSS)
+        return _ENCRYPTED
     try:
         units = [packet] if plain is None else plain.filter(packet)
     except FFmpegError:

@@ -15,6 +15,7 @@ from mvcodec.cli.arguments import (
     positive_int,
     positive_number,
 )
+from mvcodec.cli.info import count
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.progress import progress
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
@@ -77,13 +78,21 @@ def run(arguments: argparse.Namespace) -> None:
         if arguments.calibration is not None:
             array = replace(array, calibration=read_calibration(arguments.calibration))
         require_calibration(array, arguments.nominal)
+        total = frames = 0
+        first: int | None = None
         for number, decoded in enumerate(decoder):
             if number == 0:
                 maps = (item.values_px for item in decoded.disparities.values())
                 warn_behind_infinity(array, maps, arguments.input)
+                first = decoded.index
             points = points_of(replace(decoded, array=array), arguments.stride, arguments.max_depth)
+            total += len(points.places_m)
+            frames += 1
             if suffix == ".ply":
                 write_ply(target, points)
                 break
             writer.push(decoded.index, decoded.time_ns, points.places_m, points.colours)
             bar.update()
+    if not arguments.quiet and frames:
+        of = f"frame {first}" if suffix == ".ply" else count(frames, "frame")
+        print(f"{target}: {count(total, 'point')} of {of}")
