@@ -33,7 +33,7 @@ from mvcodec.cli.live_options import input_or_camera, is_live
 from mvcodec.cli.live_view_option import add_live_view, live_view
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.picture_options import add_picture_options, reading_of
-from mvcodec.cli.progress import progress
+from mvcodec.cli.progress import CodingProgress, progress, stage
 from mvcodec.cli.rig_option import add_rig, rectified_source
 from mvcodec.cli.safety import add_chunk_ms
 from mvcodec.cli.segment_options import add_segment, check_continues, plan
@@ -171,11 +171,11 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
     if source.has_given and not given:
         text = f"{source.name}: it has disparity or depth of its own, which --matcher {GIVEN} codes"
         warnings.warn(text, MvCodecWarning, stacklevel=2)
-    range_px = (
-        source.disparity_range_px
-        if isinstance(source, DecodedSource) and arguments.disparity_range_px is None
-        else find_range(source, chosen, arguments.disparity_range_px, given)
-    )
+    if isinstance(source, DecodedSource) and arguments.disparity_range_px is None:
+        range_px = source.disparity_range_px
+    else:
+        with stage("find the range of disparities", quiet=arguments.quiet):
+            range_px = find_range(source, chosen, arguments.disparity_range_px, given)
     if arguments.dry_run:
         print(plan(array, config, chosen, range_px))
         return None
@@ -233,7 +233,7 @@ def _encode(
             deferred_interrupt() as interrupted,
             writer,
             Encoder(array, config, coded_before=arguments.continues) as encoder,
-            progress("encode", len(chosen), quiet=arguments.quiet) as bar,
+            CodingProgress(len(chosen), quiet=arguments.quiet) as bar,
         ):
             for frame_set in source.frame_sets(slice(chosen.start, chosen.stop), encoder.views):
                 packets = encoder.push(frame_set)

@@ -14,10 +14,8 @@ from mvcodec.capture.live_cameras import LiveCameras
 from mvcodec.capture.recording import Recording
 from mvcodec.errors import InputError, MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet, Picture
-from mvcodec.rigs.calibration import calibrate_from_scene
 from mvcodec.rigs.delay import find_delays
 from mvcodec.rigs.look import look_at
-from mvcodec.rigs.recorded import recorded_rig
 from mvcodec.rigs.remap import RectifiedSource, Rectifier, rectified
 from mvcodec.rigs.rig import Rig, read_rig
 from mvcodec.stream import view_name
@@ -76,6 +74,8 @@ def _rig_of(source: ArraySource, chosen: range, arguments: argparse.Namespace) -
         raise SettingError("rig", RECORDED, f"{AUTO} or a RIG.json: {source.name} is no recording")
     if arguments.rig != AUTO:
         return read_rig(Path(arguments.rig))
+    from mvcodec.rigs.calibration import calibrate_from_scene  # SciPy's optimisation takes long to load
+
     found = calibrate_from_scene(source, chosen)
     if not arguments.quiet and not arguments.json:
         print(f"{source.name}: {found.summary()}", file=sys.stderr)
@@ -133,6 +133,8 @@ def rectified_stream(source: Recording | LiveCameras, arguments: argparse.Namesp
             "rig", AUTO, f"{RECORDED} or a RIG.json: a recording is read once, from front to back"
         )
     if arguments.rig == RECORDED:
+        from mvcodec.rigs.recorded import recorded_rig
+
         rig = recorded_rig(source.array, source.cameras, source.name)
     elif arguments.rig is not None:
         rig = read_rig(Path(arguments.rig))
