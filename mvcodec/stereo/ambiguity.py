@@ -43,7 +43,8 @@ def unambiguous(left: FloatMap, right: FloatMap, disparity: FloatMap, span_px: t
     width = left.shape[1]
     mean_left, mean_right = _mean(left), _mean(right)
     scale_left, scale_right = _scale(left, mean_left), _scale(right, mean_right)
-    own, other = np.full((2, *left.shape), -1, np.float32)
+    none = np.float32(-1)  # correlates less than anything; NumPy is slow at `where=`
+    own, other = np.full((2, *left.shape), none, np.float32)
     for shift in range(math.floor(span_px[0]), math.ceil(span_px[1]) + 1):
         first, last = max(shift, 0), min(width + shift, width)
         if last - first < WINDOW:
@@ -52,8 +53,8 @@ def unambiguous(left: FloatMap, right: FloatMap, disparity: FloatMap, span_px: t
         covariance = _mean(left[here] * right[there]) - mean_left[here] * mean_right[there]
         correlation = covariance * scale_left[here] * scale_right[there]
         is_own = np.abs(disparity[here] - shift) < OWN_PX
-        np.maximum(own[here], correlation, out=own[here], where=is_own)
-        np.maximum(other[here], correlation, out=other[here], where=~is_own)
+        np.maximum(own[here], np.where(is_own, correlation, none), out=own[here])
+        np.maximum(other[here], np.where(is_own, none, correlation), out=other[here])
     return np.asarray((own - other > LEAD) | (other < ALIKE))
 
 
