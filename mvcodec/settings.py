@@ -105,7 +105,11 @@ class Setting:
             SettingError: it stands for none.
         """
         nothing = self.optional and text in NONE_WORDS and text not in (self._choices or ())
-        return None if nothing else self._value(text, name or self.name)
+        return None if nothing else self.given(text, name)
+
+    def given(self, text: str, name: str = "") -> Any:
+        """As `parsed`, where nothing is said by saying nothing: no word stands for it."""
+        return self._value(text, name or self.name)
 
     @property
     def _choices(self) -> Collection[Any] | None:

@@ -32,7 +32,7 @@ from mvcodec.scenes.scene import SceneSettings
 from mvcodec.settings import settings_of
 from mvcodec.video.codec import RateControl
 
-disparity_qp = reader(settings_of(EncoderConfig)["disparity_qp"])
+disparity_qp = reader(settings_of(EncoderConfig)["disparity_qp"], open_word="auto")
 
 
 @pytest.mark.parametrize(

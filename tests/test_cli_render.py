@@ -132,7 +132,7 @@ def test_slice_and_refocus(coded: Path, tmp_path: Path) -> None:
         ("a.gif", "--path sweep --style epipolar", "--path"),
         ("a.gif", "--style cubist", "side-by-side"),
         ("a.gif", "--view 0,2.5", "col 0..2"),
-        ("a.gif", "--refocus nan", "a number of px"),
+        ("a.gif", "--refocus nan", "expected a number"),
         ("a.gif", "--grid 3x3", "--grid: found 3x3"),
         ("a.gif", "--style quilt --grid 999x999", "1024 views"),
         ("a_qs8x6a1.5.gif", "--style quilt --grid 3x3", "_qs3x3a1.5"),

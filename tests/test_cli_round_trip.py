@@ -60,7 +60,7 @@ def test_info_has_the_documented_form(coded: Path) -> None:
     assert info["fps"] == 10.0
     assert info["size"] == [WIDTH, HEIGHT]
     assert info["calibration"] == "given"
-    assert set(info["bits"]) == {"total", "texture", "disparity", "other"}
+    assert set(info["bits"]) == {"total", "texture", "disparity", "enhancement", "other"}
     assert info["bits"]["total"] == 8 * coded.stat().st_size
     assert info["bits"]["total"] == sum(info["bits"][part] for part in ("texture", "disparity", "other"))
     low, high = info["disparity_range_px"]

@@ -180,9 +180,8 @@ def test_a_picture_that_stands_is_not_drawn_again(page: Page) -> None:
     }""")
     page.keyboard.press(",")
     waits_for(page, "shown.frame === 1")
-    page.wait_for_function("window.drawn > 0")
     # The picture that stands is drawn once more, with all detail; then nobody asks for another one.
-    page.evaluate("new Promise((resolve) => setTimeout(resolve, 600))")
+    page.evaluate("document.querySelector('mvcodec-player').settled()")
     drawn = page.evaluate("window.drawn")
     page.evaluate("new Promise((resolve) => setTimeout(resolve, 600))")
     assert page.evaluate("window.drawn") == drawn

@@ -10,6 +10,8 @@ from mvcodec.cli.arguments import OPTIONS, in_options
 from mvcodec.errors import SettingError
 from mvcodec.settings import Setting, did_you_mean, settings_of, show
 
+AUTO = "auto"
+"""Leaves a setting to the encoder, where its option's metavar names it."""
 MOST_SHOWN = 5
 """How many choices stand in a usage line; more are listed in the help."""
 
@@ -46,19 +48,24 @@ def add_setting(
     group.add_argument(
         OPTIONS[name],
         dest=name,
-        type=reader(known, parse),
+        type=reader(known, parse, AUTO if parse is None and (metavar or "").endswith(f"|{AUTO}") else None),
         default=None if left_open else known.default,
         metavar=metavar or ("|".join(given or ()) if shown else _kind(known)),
         help=in_options(meaning + note + sign + default).replace("%", "%%"),
     )
 
 
-def reader(known: Setting, parse: Callable[[str], Any] | None = None) -> Callable[[str], Any]:
-    """What argparse calls with the text of an option: the value, checked against the setting."""
+def reader(
+    known: Setting, parse: Callable[[str], Any] | None = None, open_word: str | None = None
+) -> Callable[[str], Any]:
+    """What argparse calls with the text of an option: the value, checked against the setting.
+
+    `open_word` says the same as leaving the option away.
+    """
 
     def read(text: str) -> Any:
         try:
-            value = (parse or known.parsed)(text)
+            value = None if text == open_word else (parse or known.given)(text)
         except SettingError as error:
             raise argparse.ArgumentTypeError(f"found {text!r}, expected {error.expected}") from None
         try:
