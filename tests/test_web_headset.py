@@ -10,7 +10,7 @@ import pytest
 from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS
 from player_files import decode_picture
 from playwright.sync_api import Page, expect
-from web_fixtures import Site, open_player
+from web_fixtures import Site, open_player, waits_for
 
 from mvcodec.frames import Picture
 
@@ -38,12 +38,6 @@ def page(tab: Page) -> Page:
         device.stereoEnabled = true;
     """)
     return tab
-
-
-def waits_for(page: Page, condition: str) -> None:
-    page.wait_for_function(
-        f"() => {{ const shown = document.querySelector('mvcodec-player').shown; return {condition}; }}"
-    )
 
 
 def enter(page: Page, site: Site, recording: Path, view: str) -> None:

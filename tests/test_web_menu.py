@@ -14,7 +14,7 @@ from browser_page import CHROMIUM, NO_CHROMIUM
 from numpy.typing import NDArray
 from player_files import Running, decode_picture, playing
 from playwright.sync_api import Page, expect
-from web_fixtures import Site, open_player, pixels_of
+from web_fixtures import Site, open_player, pixels_of, waits_for
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 pytest_plugins = ("web_fixtures",)
@@ -37,13 +37,6 @@ def page(tab: Page, server: Running) -> Page:
     tab.goto(f"{server.url}?view=1,1&t=0.2")
     tab.evaluate("document.querySelector('mvcodec-player').ready")
     return tab
-
-
-def waits_for(page: Page, condition: str) -> None:
-    """Wait until something holds of what is `shown`."""
-    page.wait_for_function(
-        f"() => {{ const shown = document.querySelector('mvcodec-player').shown; return {condition}; }}"
-    )
 
 
 def settled(page: Page) -> None:

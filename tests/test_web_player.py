@@ -11,7 +11,7 @@ import pytest
 from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS
 from player_files import Running, playing
 from playwright.sync_api import Page, expect
-from web_fixtures import Site, open_player, pixels_of
+from web_fixtures import Site, open_player, pixels_of, waits_for
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 pytest_plugins = ("web_fixtures",)
@@ -37,13 +37,6 @@ def page(tab: Page, server: Running) -> Page:
 def shown(page: Page) -> dict[str, object]:
     found: dict[str, object] = page.evaluate("document.querySelector('mvcodec-player').shown")
     return found
-
-
-def waits_for(page: Page, condition: str) -> None:
-    """Wait until something holds of what is `shown`."""
-    page.wait_for_function(
-        f"() => {{ const shown = document.querySelector('mvcodec-player').shown; return {condition}; }}"
-    )
 
 
 def ask(server: Running, path: str, **headers: str) -> http.client.HTTPResponse:

@@ -134,6 +134,13 @@ def pixels_of(page: Page, selector: str = "mvcodec-player", fine: bool = True) -
     return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4)[..., :3]
 
 
+def waits_for(page: Page, condition: str) -> None:
+    """Wait until something holds of what is `shown`."""
+    page.wait_for_function(
+        f"() => {{ const shown = document.querySelector('mvcodec-player').shown; return {condition}; }}"
+    )
+
+
 def open_player(page: Page, site: Site, recording: str, attributes: str = "") -> None:
     """An element for a recording on a page of its own, with its first picture on the screen."""
     page.goto(f"{site.url}/blank.html")
