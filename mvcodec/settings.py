@@ -12,6 +12,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from difflib import get_close_matches
 from enum import Enum
 from functools import cache
+from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -37,7 +38,7 @@ class Setting:
 
     Attributes:
         name: of the field.
-        type: what values are instances of, `None` aside.
+        type: what values are instances of, `None` aside. Of a tuple, bounds and choices are each part's.
         default: None where something is chosen, if `optional`.
         help: one line without a full stop.
         low, high: the smallest and the largest value; None: no bound.
@@ -118,11 +119,21 @@ class Setting:
         return list(self.type) if isinstance(self.type, type) and issubclass(self.type, Enum) else None
 
     def _fits(self, value: Any) -> bool:
-        if self.type is bool:
+        if get_origin(self.type) is not tuple:
+            return self._part_fits(value, self.type)
+        kinds = get_args(self.type)
+        if isinstance(value, tuple) and kinds[-1] is Ellipsis:
+            kinds = kinds[:1] * len(value)
+        return (
+            isinstance(value, tuple) and len(value) == len(kinds) and all(map(self._part_fits, value, kinds))
+        )
+
+    def _part_fits(self, value: Any, kind: Any) -> bool:
+        if kind is bool:
             return isinstance(value, bool)
-        if self.type in (int, float):
-            number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-            if not number or (self.type is int and value != int(value)):
+        if kind in (int, float):
+            number = isinstance(value, Integral if kind is int else Real) and not isinstance(value, bool)
+            if not number or not math.isfinite(value):
                 return False
         if self._choices is not None and value not in self._choices:
             return False
@@ -193,6 +204,8 @@ def show(value: Any) -> str:
         return NONE_WORDS[0]
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, tuple):
+        return ("x" if all(isinstance(part, int) for part in value) else ",").join(map(show, value))
     return str(value)
 
 

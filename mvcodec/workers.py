@@ -12,20 +12,40 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from mvcodec.errors import SettingError
+from mvcodec.settings import check_settings, setting
 
 MAX_THREADS = 256
-THREADS_HELP = "threads that compute at once (default: one for each core); no result depends on it"
 
 Result = TypeVar("Result")
 
 _scope: contextvars.ContextVar[int | None] = contextvars.ContextVar("threads", default=None)
 _pools: dict[int, ThreadPoolExecutor] = {}
 _lock = threading.Lock()
+
+
+def thread_setting() -> Any:
+    """The field of every settings class that has a number of threads."""
+    return setting(
+        None,
+        "threads that compute at once; no result depends on it (default: one for each core)",
+        low=1,
+        high=MAX_THREADS,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerSettings:
+    """How a process, a decoder or a synthesizer computes."""
+
+    threads: int | None = thread_setting()
+
+    def __post_init__(self) -> None:
+        check_settings(self)
 
 
 class _Process:
@@ -36,9 +56,7 @@ class _Process:
 
 def check_threads(count: int | None) -> None:
     """Raise SettingError where a number of threads is given that cannot be."""
-    whole = isinstance(count, int) and not isinstance(count, bool)
-    if count is not None and not (whole and 1 <= count <= MAX_THREADS):
-        raise SettingError("threads", count, f"a whole number, 1..{MAX_THREADS}")
+    WorkerSettings(count)
 
 
 def set_threads(count: int | None) -> None:

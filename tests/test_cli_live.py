@@ -25,7 +25,7 @@ from mvcodec.container import McapReader, McapWriter, read_info
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.encoding.encoder import Encoder
-from mvcodec.encoding.live import WAITING_INPUT, WAITING_OUTPUT, LiveEncoding
+from mvcodec.encoding.live import WAITING_INPUT, WAITING_OUTPUT, BehindSettings, LiveEncoding
 from mvcodec.errors import OutputError, SettingError
 
 FAST = ("--preset", "ultrafast", "--disparity-range", "0,16", "--topics", GRID)
@@ -223,7 +223,7 @@ def _live(count: int, when_behind: str, seconds: float) -> tuple[LiveEncoding, b
         Encoder(array, config()) as encoder,
         McapWriter(cast("BinaryIO", target), chunk_ms=0) as writer,
     ):
-        live = LiveEncoding(encoder, writer, when_behind)  # type: ignore[arg-type]
+        live = LiveEncoding(encoder, writer, BehindSettings(when_behind))  # type: ignore[arg-type]
         live.run(frame_set(array, index) for index in range(count))
         writer.note({DROPPED_KEY: str(live.dropped)})
         target.seconds = 0
@@ -304,7 +304,7 @@ def test_queues_are_bounded() -> None:
         Encoder(array, config()) as encoder,
         McapWriter(cast("BinaryIO", Stuck(0)), chunk_ms=0) as writer,
     ):
-        live = LiveEncoding(encoder, writer, "block")
+        live = LiveEncoding(encoder, writer)
         running = threading.Thread(target=live.run, args=(come(),), daemon=True)
         running.start()
         time.sleep(1.5)
@@ -325,7 +325,7 @@ def test_errors_of_reading_and_writing_come_out() -> None:
     for policy in ("drop", "block"):
         target = io.BytesIO()
         with Encoder(array, config()) as encoder, McapWriter(target) as writer:
-            live = LiveEncoding(encoder, writer, policy)
+            live = LiveEncoding(encoder, writer, BehindSettings(policy))
             with pytest.raises(OutputError, match="gone"):
                 live.run(failing())  # type: ignore[arg-type]
         assert _indexes(target.getvalue()) == [0]

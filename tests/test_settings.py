@@ -58,6 +58,7 @@ def test_the_field_says_everything() -> None:
         ("side", "up"),
         ("span", 0.0),
         ("window", 2.5),
+        ("window", 3.0),
     ],
 )
 def test_values_outside_are_refused_by_name(field: str, value: object) -> None:
@@ -110,3 +111,34 @@ def test_a_changed_config_keeps_its_rate_or_takes_the_new_one() -> None:
 def test_two_rates_are_refused() -> None:
     with pytest.raises(SettingError, match="qp, crf, bitrate_kbps: found qp and crf, expected exactly one"):
         EncoderConfig(qp=27, crf=23)
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    grid: tuple[int, int] = setting((2, 2), "(rows, cols)", low=1, high=9, expected="RxC, each 1..9")
+    flaws: tuple[str, ...] = setting(("gain",), "what is wrong", choices=("gain", "delay"))
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+
+def test_bounds_and_choices_of_a_tuple_are_each_parts() -> None:
+    assert Pair((9, 1), ()).flaws == ()
+    assert Pair(flaws=("delay", "gain")).grid == (2, 2)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "found"),
+    [
+        ("grid", (0, 2), "0x2"),
+        ("grid", (2, 10), "2x10"),
+        ("grid", (2, 2, 2), "2x2x2"),
+        ("grid", (2.0, 2), "2.0,2"),
+        ("grid", "2x2", "2x2"),
+        ("flaws", ("gain", "dust"), "gain,dust"),
+        ("flaws", "gain", "gain"),
+    ],
+)
+def test_tuples_outside_are_refused_as_they_are_written(field: str, value: object, found: str) -> None:
+    with pytest.raises(SettingError, match=rf"^{field}: found {found}, expected "):
+        replace(Pair(), **{field: value})  # type: ignore[arg-type]

@@ -17,7 +17,7 @@ from mvcodec.capture.live_camera import LiveCamera, LivePicture
 from mvcodec.capture.live_clock import common_clock
 from mvcodec.capture.pairing import NEAREST_SHARE
 from mvcodec.capture.recorded_calibration import RecordedCamera
-from mvcodec.capture.selection import select_real
+from mvcodec.capture.selection import real_cameras, select_real
 from mvcodec.capture.timing import nominal_fps, tolerance
 from mvcodec.capture.video_input import frame_to_rgb
 from mvcodec.container.recorded_pictures import Clock
@@ -40,8 +40,7 @@ class LiveSettings:
     Attributes:
         addresses: of all cameras of the grid, row by row.
         grid: (rows, cols).
-        real: which cameras are real, as `select_real` reads it.
-        fps, tolerance_ms, patience_s: explained by their fields.
+        real, fps, tolerance_ms, patience_s: explained by their fields.
         calibration: of all cameras; None: nominal.
         clock: the senders' stamps, or arrival; None: stamps where they seem to be of one clock.
         offsets_ms: what is added to the times of an address.
@@ -52,7 +51,7 @@ class LiveSettings:
 
     addresses: Sequence[str]
     grid: tuple[int, int]
-    real: str = "corners"
+    real: str = real_cameras()
     fps: float | None = nominal_fps()
     tolerance_ms: float | None = tolerance()
     calibration: Calibration | None = None

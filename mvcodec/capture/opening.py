@@ -11,7 +11,7 @@ from mvcodec.capture.bit_depth import BitDepth
 from mvcodec.capture.manifest import DEFAULT_FPS, MANIFEST_NAME, Manifest, ViewFiles, read_manifest
 from mvcodec.capture.named_files import open_files, tell_notes
 from mvcodec.capture.reading import Reading
-from mvcodec.capture.selection import RealAxes, select_real
+from mvcodec.capture.selection import CORNERS, RealAxes, select_real
 from mvcodec.capture.shared_clock import StatedTimes, common_times
 from mvcodec.capture.source import ArraySource
 from mvcodec.capture.timing import Timing
@@ -30,7 +30,7 @@ def open_input(
     paths: Sequence[str | os.PathLike[str]] | str | os.PathLike[str],
     *,
     grid: tuple[int, int] | None = None,
-    real: str = "corners",
+    real: str = CORNERS,
     timing: Timing | None = None,
     reading: Reading | None = None,
     originals: bool = True,

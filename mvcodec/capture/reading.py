@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from mvcodec.array import MAX_GRID_SIDE
 from mvcodec.capture.bit_depth import LEAST_BITS, MOST_BITS
-from mvcodec.errors import InputError, SettingError
+from mvcodec.errors import InputError
 from mvcodec.settings import check_settings, setting
 
 OnUnreadable = Callable[[InputError], None]
@@ -23,25 +24,34 @@ def used_bits() -> Any:
     )
 
 
+def views_in_pictures(default: tuple[int, int] | None = None) -> Any:
+    """The field of every settings class of an input whose pictures may hold several views."""
+    return setting(
+        default,
+        "views in each picture of the files or topics: 1x2 side by side, 2x1 top and bottom, or"
+        " a mosaic (default: 1x1, and what a quilt's name says)",
+        low=1,
+        high=MAX_GRID_SIDE,
+        expected=f"RxC, each 1..{MAX_GRID_SIDE}",
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Reading:
     """Settings of every kind of input.
 
     Attributes:
-        bits: explained by its field; see `BitDepth`.
+        bits, split: explained by their fields; see `BitDepth`. No `split`: one view, or those of a quilt.
         on_unreadable: told of a picture that cannot be read, whose frame set is left out; None: it is
             raised.
-        split: (rows, cols) of views in each picture of a file; None: one, or those of a quilt by its name.
 
     Raises:
-        SettingError: `bits` is out of range, or `split` has no view.
+        SettingError: `bits` or `split` is out of range.
     """
 
     bits: int | None = used_bits()
     on_unreadable: OnUnreadable | None = None
-    split: tuple[int, int] | None = None
+    split: tuple[int, int] | None = views_in_pictures()
 
     def __post_init__(self) -> None:
         check_settings(self)
-        if self.split is not None and min(self.split) < 1:
-            raise SettingError("split", f"{self.split[0]}x{self.split[1]}", "RxC, at least 1x1")

@@ -8,8 +8,8 @@ from itertools import chain
 from typing import get_args
 
 from mvcodec.array import Calibration, Position
-from mvcodec.capture.reading import used_bits
-from mvcodec.capture.selection import select_real
+from mvcodec.capture.reading import used_bits, views_in_pictures
+from mvcodec.capture.selection import real_cameras, select_real
 from mvcodec.capture.timing import nominal_fps, tolerance
 from mvcodec.container.recorded_pictures import Clock
 from mvcodec.errors import SettingError
@@ -24,19 +24,17 @@ class RecordingSettings:
 
     Attributes:
         topics: of every view of the grid, or of every `split` views, row by row.
-        real: which cameras are real, as `select_real` reads it.
         calibration: of all cameras; None: the recording's own, or nominal.
         offsets_ms: what is added to a topic's times.
-        fps, tolerance_ms, clock, bits: explained by their fields.
+        real, fps, tolerance_ms, clock, bits, split: explained by their fields.
         depth_topics: of the depth of every view, rows as `topics` has them; None: there is none.
-        split: (rows, cols) of views in each picture.
 
     Raises:
         SettingError: the grid is not one, names a topic twice, or a number is out of range.
     """
 
     topics: TopicGrid
-    real: str = "corners"
+    real: str = real_cameras()
     fps: float | None = nominal_fps()
     tolerance_ms: float | None = tolerance()
     calibration: Calibration | None = None
@@ -48,7 +46,7 @@ class RecordingSettings:
     offsets_ms: Mapping[str, float] = field(default_factory=dict)
     bits: int | None = used_bits()
     depth_topics: TopicGrid | None = None
-    split: tuple[int, int] = (1, 1)
+    split: tuple[int, int] = views_in_pictures((1, 1))
 
     def __post_init__(self) -> None:
         widths = {len(row) for row in self.topics}
@@ -62,8 +60,6 @@ class RecordingSettings:
                     "depth_topics", found, f"rows of topics as `topics` has them: {len(names)}"
                 )
             names += chain.from_iterable(self.depth_topics)
-        if min(self.split) < 1:
-            raise SettingError("split", f"{self.split[0]}x{self.split[1]}", "RxC, at least 1x1")
         if self.depth_topics is not None and self.split != (1, 1):
             raise SettingError("split", "with depth_topics", "a topic for each view")
         if len(set(names)) != len(names):

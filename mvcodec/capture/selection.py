@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from mvcodec.array import legal_steps
 from mvcodec.errors import SettingError
+from mvcodec.settings import setting
+
+CORNERS = "corners"
 
 _SHOWN_PER_AXIS = 4
 
 RealAxes = tuple[tuple[int, ...], tuple[int, ...]]
 """(rows, cols) whose crossings are real cameras."""
+
+
+def real_cameras() -> Any:
+    """The field of every settings class of an input, read by `select_real`."""
+    return setting(CORNERS, "the cameras to code; corners: both ends of a linear array")
 
 
 def select_real(text: str, rows: int, cols: int) -> RealAxes:
@@ -20,7 +30,7 @@ def select_real(text: str, rows: int, cols: int) -> RealAxes:
     Raises:
         SettingError: another text, or cameras that this grid doesn't allow; names those it does.
     """
-    if text == "corners":
+    if text == CORNERS:
         return _axis(rows, max(rows - 1, 1)), _axis(cols, max(cols - 1, 1))
     if text == "all":
         return _axis(rows, 1), _axis(cols, 1)

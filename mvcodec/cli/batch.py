@@ -14,12 +14,13 @@ from mvcodec.cli.arguments import join_negative_values
 from mvcodec.cli.cluster_options import add_cluster
 from mvcodec.cli.info import count
 from mvcodec.cli.progress import progress
+from mvcodec.cli.setting_options import add_setting
 from mvcodec.cluster.batch_inputs import find_recordings
 from mvcodec.cluster.batch_run import SEGMENTED, Batch, Job, Option, Progress, run_batch
 from mvcodec.cluster.connection import connected, local_workers
 from mvcodec.cluster.places import Place
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
-from mvcodec.workers import check_threads, thread_count
+from mvcodec.workers import WorkerSettings, thread_count
 
 PURPOSES = {
     "encode": "code array folders, in segments that are joined",
@@ -112,12 +113,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "--json", action="store_true", help="print what became of each recording as JSON"
         )
         if name in COMPUTING:
-            command.add_argument(
-                "--threads",
-                type=int,
-                metavar="N",
-                help="of each task (default: local workers share the cores, others use all of theirs)",
-            )
+            note = ", of each task (default: local workers share the cores, others use all of theirs)"
+            add_setting(command, WorkerSettings, "threads", metavar="N", left_open=True, note=note)
         _forward(command, name)
 
 
@@ -222,7 +219,6 @@ def _check_segment(batch: Batch) -> None:
 
 def _threads(arguments: argparse.Namespace) -> int | None:
     given: int | None = getattr(arguments, "threads", None)
-    check_threads(given)
     workers = local_workers(arguments.cluster)
     if given is not None or workers is None or arguments.what not in COMPUTING:
         return given

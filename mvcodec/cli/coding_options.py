@@ -9,6 +9,7 @@ from typing import Any
 
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource
+from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.cli.arguments import (
     SPECIFICATION,
     codec_name,
@@ -44,12 +45,7 @@ def add_input(
     """``INPUT``, ``--grid`` and ``--real``."""
     parser.add_argument("input", type=kind, nargs="+", metavar="INPUT", help=what)
     parser.add_argument("--grid", type=pair_of_sizes, metavar="RxC", help="grid of the input's views")
-    parser.add_argument(
-        "--real",
-        default="corners",
-        metavar="corners|all|every:K|R,R..xC,C..",
-        help="the cameras to code (default: corners, or both ends of a linear array)",
-    )
+    add_setting(parser, RecordingSettings, "real", metavar="corners|all|every:K|R,R..xC,C..")
 
 
 def add_coding(parser: argparse.ArgumentParser) -> None:

@@ -14,6 +14,7 @@ from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.capture.manifest import read_calibration
 from mvcodec.capture.recording_files import recording_files
+from mvcodec.capture.selection import CORNERS
 from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, add_output_options
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.encode_stream import (
@@ -47,6 +48,7 @@ from mvcodec.depth import require_calibration
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.speed_choice import FOR_LIVE
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
+from mvcodec.evaluation.quality_target import QualityTarget
 from mvcodec.output.live_view import LiveView
 from mvcodec.settings import settings_of
 from mvcodec.synthesis.synthesizers import make_synthesizer
@@ -75,13 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KBPS",
         note=", with --enhance auto of the layer too; 2M is 2000",
     )
-    rate.add_argument(
-        "--target-psnr",
-        type=float,
-        metavar="DB",
-        help="the largest QP whose mean luma PSNR over all views of the grid is DB or more, measured on 2"
-        " frame sets from the middle of INPUT, which must have the originals of all views",
-    )
+    add_setting(rate, QualityTarget, "target_psnr", metavar="DB")
     add_coding(parser)
     add_layer(parser)
     parser.add_argument(
@@ -213,7 +209,7 @@ def _open(arguments: argparse.Namespace) -> ArraySource:
                 option is not None for option in (arguments.enhance, arguments.target_psnr, arguments.rig)
             ),
         )
-    for option, found, default in (("--grid", arguments.grid, None), ("--real", arguments.real, "corners")):
+    for option, found, default in (("--grid", arguments.grid, None), ("--real", arguments.real, CORNERS)):
         if found != default:
             raise SettingError(option, found, f"no such option: {path} has its own")
     return DecodedSource(path)

@@ -32,7 +32,7 @@ from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.decoding.decoded_source import is_own_file
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
-from mvcodec.encoding.live import LiveEncoding, WhenBehind
+from mvcodec.encoding.live import BehindSettings, LiveEncoding
 from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet
 from mvcodec.output.live_view import LiveView
@@ -43,7 +43,6 @@ GIVEN = "given"
 """The matcher that takes what the input has."""
 
 STREAM_SETTINGS = ("topics", "depth_topics", "when_behind", "clock", "patience_s")
-DEFAULT_WHEN_BEHIND: WhenBehind = "block"
 
 
 class Unfinished(MvCodecError):
@@ -63,11 +62,12 @@ def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="T,T;T,T",
         help="the depth topic of every view, for --matcher given: 16UC1 (mm), 32FC1 (m) or compressedDepth",
     )
-    group.add_argument(
-        "--when-behind",
-        choices=("drop", "block"),
-        help="where coding or the reader of OUT is too slow: leave frame sets out, or let INPUT wait"
-        f" (default: {DEFAULT_WHEN_BEHIND})",
+    add_setting(
+        group,
+        BehindSettings,
+        "when_behind",
+        left_open=True,
+        note=f" (default: {BehindSettings().when_behind})",
     )
     usual = settings_of(RecordingSettings)["clock"].default
     add_setting(
@@ -142,7 +142,8 @@ def _run(
 ) -> McapWriter:
     writer = open_target(arguments, view)
     encoder = Encoder(source.array, config)
-    live = LiveEncoding(encoder, writer, arguments.when_behind or DEFAULT_WHEN_BEHIND)
+    behind = BehindSettings() if arguments.when_behind is None else BehindSettings(arguments.when_behind)
+    live = LiveEncoding(encoder, writer, behind)
     try:
         with (
             deferred_interrupt() as interrupted,

@@ -12,11 +12,12 @@ from typing import Any, NoReturn
 
 import mvcodec
 from mvcodec.cli.arguments import as_option, in_options, join_negative_values, names_as_paths
+from mvcodec.cli.setting_options import add_setting
 from mvcodec.cli.standard_streams import ReaderGone, checked_streams
 from mvcodec.cli.warning_lines import WarningLines
 from mvcodec.cli.wording import in_our_words, with_suggestion
 from mvcodec.errors import MvCodecError, MvCodecWarning, OutputError, SettingError
-from mvcodec.workers import THREADS_HELP, set_threads
+from mvcodec.workers import WorkerSettings, set_threads
 
 COMMANDS: dict[str, str] = {
     "sample": "render the sample scene as an array folder",
@@ -133,7 +134,7 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
 def _add_arguments(name: str, parser: argparse.ArgumentParser) -> None:
     _module(name).add_arguments(parser)
     if name in COMPUTING:
-        parser.add_argument("--threads", type=int, metavar="N", help=THREADS_HELP)
+        add_setting(parser, WorkerSettings, "threads", metavar="N")
 
 
 def _use_threads(count: int | None) -> None:

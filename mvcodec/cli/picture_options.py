@@ -15,13 +15,7 @@ from mvcodec.errors import InputError, MvCodecWarning
 def add_picture_options(parser: argparse.ArgumentParser) -> None:
     """``--bits``, ``--split`` and ``--on-error``."""
     add_setting(parser, Reading, "bits")
-    parser.add_argument(
-        "--split",
-        type=pair_of_sizes,
-        metavar="RxC",
-        help="views in each picture of the files or topics: 1x2 side by side, 2x1 top and bottom, or a mosaic"
-        " (default: 1x1, and what a quilt's name says)",
-    )
+    add_setting(parser, Reading, "split", parse=pair_of_sizes, metavar="RxC")
     add_on_error(parser, "stop", "at a picture that cannot be read: leave its frame set out, or stop")
 
 

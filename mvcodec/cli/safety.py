@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import argparse
 import re
-from dataclasses import fields
 
 from mvcodec.container.chunked_file import CHUNK_MS, MAX_CHUNK_MS
 from mvcodec.container.limits import Limits
+from mvcodec.errors import SettingError
+from mvcodec.settings import did_you_mean, settings_of
 
 
 def limit(text: str) -> tuple[str, int]:
     """``NAME=N``: one of the limits on what a file may ask for."""
-    match = re.fullmatch(r"([a-z_]+)=(\d{1,18})", text)
-    names = [field.name for field in fields(Limits)]
-    if match is None or match[1] not in names or int(match[2]) < 1:
+    name, sign, number = text.partition("=")
+    known = settings_of(Limits)
+    if not sign or name not in known:
+        guess = did_you_mean(name, known)
         raise argparse.ArgumentTypeError(
-            f"found {text!r}, expected NAME=N, N at least 1, with NAME one of {', '.join(names)}"
+            f"found {text!r}, expected NAME=N with NAME one of {', '.join(known)}{guess}"
         )
-    return match[1], int(match[2])
+    try:
+        return name, known[name].read(number)
+    except SettingError as error:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected {name}={error.expected}") from None
 
 
 def add_limits(parser: argparse.ArgumentParser) -> None:

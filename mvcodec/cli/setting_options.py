@@ -43,7 +43,9 @@ def add_setting(
     meaning, sign, default = known.help.partition(" (default: ")
     if metavar is None and not shown and (given is not None or None not in (known.low, known.high)):
         meaning += f", {known.allowed.removeprefix('a whole number, ').removeprefix('a number, ')}"
-    if not left_open and known.default is not None:
+    if left_open and "(default: " in note:
+        sign = default = ""
+    elif known.default is not None:
         sign, default = " (default: ", f"{show(known.default)})"
     group.add_argument(
         OPTIONS[name],

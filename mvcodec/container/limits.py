@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from mvcodec.errors import SettingError, StreamError
+from mvcodec.errors import StreamError
+from mvcodec.settings import check_settings, setting
 from mvcodec.stream import StreamHeader
 
 
@@ -12,29 +13,24 @@ from mvcodec.stream import StreamHeader
 class Limits:
     """The largest sizes that are read. A file that needs more is refused by the limit's name.
 
-    Attributes:
-        max_record_bytes: a record as stored, hence a packed chunk.
-        max_chunk_bytes: a chunk, unpacked.
-        max_index_bytes: the summary of a file.
-        max_header_bytes: a header, as JSON text.
-        max_cameras: real cameras.
-        max_views: views of the dense grid.
-        max_set_pixels: pixels of a frame set: of one picture, times the real cameras.
+    Each is explained by its field.
+
+    Raises:
+        SettingError: one is no whole number of at least 1.
     """
 
-    max_record_bytes: int = 1 << 28
-    max_chunk_bytes: int = 1 << 28
-    max_index_bytes: int = 1 << 27
-    max_header_bytes: int = 1 << 20
-    max_cameras: int = 1024
-    max_views: int = 1 << 16
-    max_set_pixels: int = 1 << 28
+    max_record_bytes: int = setting(1 << 28, "a record as stored, hence a packed chunk", low=1)
+    max_chunk_bytes: int = setting(1 << 28, "a chunk, unpacked", low=1)
+    max_index_bytes: int = setting(1 << 27, "the summary of a file", low=1)
+    max_header_bytes: int = setting(1 << 20, "a header, as JSON text", low=1)
+    max_cameras: int = setting(1024, "real cameras", low=1)
+    max_views: int = setting(1 << 16, "views of the dense grid", low=1)
+    max_set_pixels: int = setting(
+        1 << 28, "pixels of a frame set: of one picture, times the real cameras", low=1
+    )
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (isinstance(value, int) and value >= 1):
-                raise SettingError(field.name, value, "a whole number of at least 1")
+        check_settings(self)
 
     def check(self, limit: str, size: int, source: str) -> None:
         """Raise StreamError where something is larger than the limit of that name."""

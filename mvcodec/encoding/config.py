@@ -21,7 +21,7 @@ from mvcodec.video.disparity_rate import (
     default_disparity_scale,
 )
 from mvcodec.video.map_size import MEDIANS, WIDEST_MEDIAN
-from mvcodec.workers import MAX_THREADS, THREADS_HELP
+from mvcodec.workers import thread_setting
 
 AUTO = "auto"
 
@@ -122,7 +122,7 @@ class EncoderConfig:
         expected=f"0 (off) or an odd number, 3..{WIDEST_MEDIAN}",
     )
     depth: bool = setting(False, "write each map as metric depth too, for other people's tools")
-    threads: int | None = setting(None, THREADS_HELP, low=1, high=MAX_THREADS)
+    threads: int | None = thread_setting()
     qp: InitVar[int | None] = None
     crf: InitVar[float | None] = None
     bitrate_kbps: InitVar[float | None] = None

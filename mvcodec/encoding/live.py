@@ -11,8 +11,8 @@ from typing import Literal, get_args
 
 from mvcodec.container import McapWriter
 from mvcodec.encoding.encoder import Encoder
-from mvcodec.errors import SettingError
 from mvcodec.frames import FrameSet
+from mvcodec.settings import check_settings, setting
 from mvcodec.stream import Packet
 
 WhenBehind = Literal["drop", "block"]
@@ -33,25 +33,39 @@ class _End:
     error: BaseException | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class BehindSettings:
+    """What is done where frame sets come faster than they can be coded and written.
+
+    Raises:
+        SettingError: another policy.
+    """
+
+    when_behind: WhenBehind = setting(
+        "block",
+        "where coding or the reader of the output is too slow: leave frame sets out before they are coded, or"
+        " let the input wait",
+        choices=get_args(WhenBehind),
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+
 class LiveEncoding:
     """Codes frame sets as they come.
 
     Args:
         encoder: codes.
         writer: takes the packets; both are closed by the caller.
-        when_behind: where coding or writing is slower than what comes, ``drop`` leaves frame sets
-            out before they are coded (their numbers are missing in the file); ``block`` lets the
-            input wait.
-
-    Raises:
-        SettingError: another policy.
+        settings: the numbers of frame sets that are left out are missing in the file.
     """
 
-    def __init__(self, encoder: Encoder, writer: McapWriter, when_behind: WhenBehind = "block") -> None:
-        if when_behind not in get_args(WhenBehind):
-            raise SettingError("when_behind", when_behind, " or ".join(get_args(WhenBehind)))
+    def __init__(
+        self, encoder: Encoder, writer: McapWriter, settings: BehindSettings = BehindSettings()
+    ) -> None:
         self._encoder, self._writer = encoder, writer
-        self._drops = when_behind == "drop"
+        self._drops = settings.when_behind == "drop"
         self._input: Queue[FrameSet | _End] = Queue(WAITING_INPUT)
         self._output: Queue[list[Packet] | None] = Queue(WAITING_OUTPUT)
         self._failure: BaseException | None = None

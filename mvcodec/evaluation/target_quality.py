@@ -11,12 +11,10 @@ from mvcodec.capture import ArraySource
 from mvcodec.encoding.config import EncoderConfig, find_matcher
 from mvcodec.errors import SettingError
 from mvcodec.evaluation.chain import measure_chain
+from mvcodec.evaluation.quality_target import PROBED_SETS
 from mvcodec.evaluation.remembered import MapSpool, Remembered
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.video.codecs import find_codec
-
-PROBED_SETS = 2
-"""Frame sets that are coded, from the middle of the input on: a keyframe, and what is like all others."""
 
 _START_QP = 32
 _DB_PER_QP = 0.4

@@ -16,6 +16,7 @@ from mvcodec.frames import Picture
 from mvcodec.scenes.renderer import Matrix, Optics
 from mvcodec.scenes.scene import RoomScene, SceneSettings
 from mvcodec.scenes.solids import Vector
+from mvcodec.settings import check_settings, setting
 
 FLAWS = ("angles", "positions", "focal", "distortion", "gain", "delay")
 """What may be wrong with a camera; each can be asked for alone."""
@@ -61,21 +62,19 @@ class RoughCamera:
 class RoughRigSettings:
     """What is asked of a rough rig.
 
-    Attributes:
-        seed: of the flaws; the same flaw of the same seed is the same whatever others there are.
-        flaws: some of FLAWS.
+    Each is explained by its field.
 
     Raises:
-        SettingError: a flaw that there is not.
+        SettingError: a flaw that there is not, or a negative seed.
     """
 
-    seed: int = 0
-    flaws: tuple[str, ...] = FLAWS
+    seed: int = setting(
+        0, "of the flaws; the same flaw of the same seed is the same whatever others there are", low=0
+    )
+    flaws: tuple[str, ...] = setting(FLAWS, "what is wrong with the cameras", choices=FLAWS)
 
     def __post_init__(self) -> None:
-        for flaw in self.flaws:
-            if flaw not in FLAWS:
-                raise SettingError("rig", f"the flaw {flaw!r}", _EXPECTED)
+        check_settings(self)
 
     @classmethod
     def from_text(cls, text: str) -> RoughRigSettings:
@@ -88,7 +87,10 @@ class RoughRigSettings:
         if match is None:
             raise SettingError("rig", repr(text), _EXPECTED)
         flaws = FLAWS if match[2] is None else tuple(match[2].split(","))
-        return cls(int(match[1] or 0), flaws)
+        try:
+            return cls(int(match[1] or 0), flaws)
+        except SettingError:
+            raise SettingError("rig", repr(text), _EXPECTED) from None
 
     def cameras(self, rows: int, cols: int) -> dict[Position, RoughCamera]:
         """The flaws of every camera of a grid."""

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from mvcodec.scenes.renderer import LitScene, Matrix, Optics
 from mvcodec.scenes.room import FLOOR_FROM_M, FLOOR_M, LIGHTING, NEAREST_M, WALL_M, Room
 from mvcodec.scenes.solids import Vector
 from mvcodec.scenes.textures import photographs
-from mvcodec.settings import check_settings, setting, settings_of
+from mvcodec.settings import check_settings, setting, show
 
 ROOM_FPS = 24.0
 # Of the whole rig, whatever its grid: 20 px of disparity between its ends at the wall, at a width of 640.
@@ -28,10 +28,6 @@ _ROOM_GRID, _ROOM_FRAMES, _ROOM_SIZE = (5, 5), 24, (640, 360)
 _MIN_SIDE = 16
 _TALLEST = 4
 _LIT_FRAMES = 2
-
-
-def _by(pair: tuple[int, int] | None) -> str:
-    return "nothing" if pair is None else f"{pair[0]}x{pair[1]}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +40,9 @@ class SceneSettings:
 
     grid: tuple[int, int] | None = setting(
         None,
-        f"(rows, cols) of views (default: {_by(_ROOM_GRID)}, of a pair 1x2)",
+        f"(rows, cols) of views (default: {show(_ROOM_GRID)}, of a pair 1x2)",
+        low=1,
+        high=MAX_GRID_SIDE,
         expected=f"RxC, each 1..{MAX_GRID_SIDE}",
     )
     frames: int | None = setting(
@@ -52,19 +50,15 @@ class SceneSettings:
     )
     size: tuple[int, int] | None = setting(
         None,
-        f"(width, height) of the pictures, px (default: {_by(_ROOM_SIZE)}, or that of the photographs)",
+        f"(width, height) of the pictures, px (default: {show(_ROOM_SIZE)}, or that of the photographs)",
+        low=_MIN_SIDE,
+        high=MAX_PICTURE_SIDE,
         expected=f"WxH px, each {_MIN_SIDE}..{MAX_PICTURE_SIDE}",
     )
     seed: int = setting(0, "of what a scene leaves to chance", low=0)
 
     def __post_init__(self) -> None:
         check_settings(self)
-        cls: Any = type(self)
-        known = settings_of(cls)
-        if self.grid is not None and not all(1 <= side <= MAX_GRID_SIDE for side in self.grid):
-            raise SettingError("grid", _by(self.grid), known["grid"].allowed)
-        if self.size is not None and not all(_MIN_SIDE <= side <= MAX_PICTURE_SIDE for side in self.size):
-            raise SettingError("size", _by(self.size), known["size"].allowed)
 
 
 class Scene(Protocol):
@@ -115,7 +109,7 @@ class RoomScene:
         width, height = settings.size or _ROOM_SIZE
         if height > _TALLEST * width:
             # Beyond that the pictures would show where wall and floor end.
-            raise SettingError("size", _by((width, height)), f"at most {_TALLEST} times as high as wide")
+            raise SettingError("size", show((width, height)), f"at most {_TALLEST} times as high as wide")
         self.frame_count = settings.frames or _ROOM_FRAMES
         self._step_m = ROOM_SPAN_M / max(rows - 1, cols - 1, 1)
         self._optics = Optics(width, height, float(width))
@@ -215,7 +209,9 @@ class MotorcycleScene:
             ("size", settings.size, (width, height)),
         ):
             if found not in (None, only):
-                raise SettingError(option, _by(found), f"{_by(only)}, the real pair of the scene motorcycle")
+                raise SettingError(
+                    option, show(found), f"{show(only)}, the real pair of the scene motorcycle"
+                )
         if settings.frames not in (None, 1):
             raise SettingError("frames", settings.frames, "1, the real pair of the scene motorcycle")
         known = self._disparity[np.isfinite(self._disparity)]
