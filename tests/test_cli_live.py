@@ -329,8 +329,8 @@ def test_errors_of_reading_and_writing_come_out() -> None:
             with pytest.raises(OutputError, match="gone"):
                 live.run(failing())  # type: ignore[arg-type]
         assert _indexes(target.getvalue()) == [0]
-    with Encoder(array, config()) as encoder, pytest.raises(SettingError, match="when_behind: found maybe"):
-        LiveEncoding(encoder, McapWriter(io.BytesIO()), "maybe")  # type: ignore[arg-type]
+    with pytest.raises(SettingError, match="when_behind: found maybe"):
+        BehindSettings("maybe")  # type: ignore[arg-type]
 
 
 def test_a_keyframe_comes_each_second_however_slowly_frame_sets_come() -> None:
