@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
@@ -17,6 +18,9 @@ from timed_videos import SIZE, number_of, numbered, write_video
 from mvcodec.capture.video_input import VideoView
 from mvcodec.errors import InputError
 from mvcodec.frames import Picture
+from mvcodec.stream import TrackKind
+from mvcodec.video.codec import Planes, RateControl, VideoSettings
+from mvcodec.video.codecs import CODECS as CODECS_OF_TRACKS
 
 CODECS = {"h264": ("libx264", {}), "hevc": ("libx265", {"x265-params": "log-level=none:bframes=0:keyint=8"})}
 
@@ -59,6 +63,30 @@ def test_pictures_that_build_on_a_lost_packet_are_left_out(tmp_path: Path, codec
     assert view.notes == ("4 pictures are left out: it builds on a picture that is missing",)
     assert view.times_ns is not None
     assert view.times_ns[11] == pytest.approx(16e9 / 30, abs=1e6)
+
+
+def test_av1_whose_pictures_are_coded_out_of_order_is_whole_up_to_a_lost_packet(tmp_path: Path) -> None:
+    """Hidden pictures are usual in AV1: the numbers of those that are shown tell what is missing."""
+    rate = RateControl(qp=20)
+    settings = VideoSettings(TrackKind.TEXTURE, *SIZE, 30, 64, rate, "ultrafast", low_delay=False)
+    encoder = CODECS_OF_TRACKS["av1"].encoder(settings)
+    grey = np.full((SIZE[1] // 2, SIZE[0] // 2), 128, np.uint8)
+    units = [unit for n in range(20) for unit in encoder.push(Planes(numbered(n)[..., 0], grey, grey))]
+    units += encoder.flush()
+    assert any(len(unit.data) < 8 for unit in units), "a picture that was coded before is shown"
+    for lost, kept in ((None, 20), (11, 11)):
+        path = tmp_path / f"lost_{lost}.mkv"
+        with av.open(str(path), "w") as out:
+            stream = out.add_mux_stream("av1", rate=30, width=SIZE[0], height=SIZE[1])
+            for number, unit in enumerate(units):
+                packet = av.Packet(unit.data)
+                packet.stream, packet.time_base, packet.is_keyframe = stream, Fraction(1, 30), unit.keyframe
+                packet.pts = packet.dts = number
+                if number != lost:
+                    out.mux(packet)
+        view = VideoView(path)
+        assert shown(view) == list(range(kept))
+        assert bool(view.notes) == (lost is not None)
 
 
 def test_b_pictures_cost_those_that_build_on_the_lost_one_alone(tmp_path: Path) -> None:

@@ -32,12 +32,13 @@ _UNKNOWN_TIME = "how many pictures are missing before them is unknown, since the
 
 _MS = 1_000_000
 
-_TELL_LOSSES = ("h264", "hevc", "libdav1d", "av1")
+_TELL_LOSSES = ("h264", "hevc", "av1")
 """Codecs whose pictures say when what they build on is missing."""
 
 _GAP_STEPS = 1.5
 
-_ANNEX_B = {"h264": "h264_mp4toannexb", "hevc": "hevc_mp4toannexb"}
+_PLAIN = {"h264": "h264_mp4toannexb", "hevc": "hevc_mp4toannexb", "av1": "av1_metadata"}
+"""Filters that bring packets into the form of streams: NAL units with start codes, OBUs with sizes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +106,7 @@ def read_times(container: InputContainer, stream: VideoStream) -> VideoTimes:
     if len(stamps) < len(whole):
         left_out[_SAME_TIME] = len(whole) - len(stamps)
     times, fps = _times(stamps, stream)
-    unsure = 0 if stream.codec_context.name in _TELL_LOSSES else _gaps(whole)
+    unsure = 0 if stream.codec_context.codec.canonical_name in _TELL_LOSSES else _gaps(whole)
     return VideoTimes(tuple(stamps), False, False, times, 0, fps, left_out, cut_off, unsure)
 
 
@@ -174,9 +175,9 @@ def _packets(
     container: InputContainer, stream: VideoStream, cut_off: Callable[[str], None]
 ) -> Iterator[_Packet]:
     """The packets whose pictures are shown, in coding order."""
-    name = stream.codec_context.name
+    name = stream.codec_context.codec.canonical_name
     whole = WholePictures(name)
-    plain = BitStreamFilterContext(_ANNEX_B[name], stream) if name in _ANNEX_B else None
+    plain = BitStreamFilterContext(_PLAIN[name], stream) if name in _PLAIN else None
     started, first = False, None
     for number, packet in enumerate(with_data(container, stream, cut_off)):
         pts, dts, discard, keyframe = packet.pts, packet.dts, packet.is_discard, packet.is_keyframe

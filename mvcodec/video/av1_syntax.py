@@ -12,7 +12,7 @@ SEQUENCE_HEADER, FRAME_HEADER, FRAME = 1, 3, 6
 """obu_type (6.2.2)."""
 
 KEY_FRAME = 0
-_SWITCH_FRAME = 3
+_INTRA_ONLY, _SWITCH_FRAME = 2, 3
 _HIGH, _PROFESSIONAL = 1, 2
 """seq_profile (6.4.1)."""
 
@@ -24,8 +24,11 @@ _NOT_STARTED = "a picture before the first keyframe"
 _SELECTED = 2
 """seq_force_screen_content_tools, seq_force_integer_mv: each frame says."""
 
+_SLOTS, _ALL_SLOTS = 8, 0xFF
+"""NUM_REF_FRAMES, and refresh_frame_flags that name all of them."""
+
 _HEAD_BYTES = 64
-"""More than enough of a frame for its order hint."""
+"""More than enough of a frame for what is read of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +42,7 @@ class Av1Sequence:
         id_bits: of current_frame_id; 0 where frames have none.
         screen_content, integer_motion: seq_force_screen_content_tools, seq_force_integer_mv.
         order_bits: of order_hint; 0 where frames have none.
+        removal_bits: of all buffer_removal_time of a frame; 0 where none has any.
     """
 
     size: tuple[int, int]
@@ -48,6 +52,7 @@ class Av1Sequence:
     screen_content: int
     integer_motion: int
     order_bits: int
+    removal_bits: int
 
 
 def obus(data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -62,36 +67,44 @@ def obus(data: bytes) -> Iterator[tuple[int, bytes]]:
         if head & 0x80 or not head & 2:
             raise NalError("its forbidden bit is set, or it has no size")
         at += 2 if head & 4 else 1
-        size, shift = 0, 0
-        while True:
-            if at >= len(data) or shift > 28:
-                raise NalError("it ends too early")
-            size |= (data[at] & 0x7F) << shift
-            shift += 7
-            at += 1
-            if not data[at - 1] & 0x80:
-                break
+        size, at = _leb128(data, at)
         if at + size > len(data):
             raise NalError("it ends too early")
         yield head >> 3 & 0xF, data[at : at + size]
         at += size
 
 
+def _leb128(data: bytes, at: int) -> tuple[int, int]:
+    """A number (4.10.5), and where it ends."""
+    number = shift = 0
+    while True:
+        if at >= len(data) or shift > 28:
+            raise NalError("it ends too early")
+        number |= (data[at] & 0x7F) << shift
+        shift += 7
+        at += 1
+        if not data[at - 1] & 0x80:
+            return number, at
+
+
 class Av1Units:
-    """Reads temporal units: their rules, and their order hints, which FORMAT.md has count up by one.
+    """Reads temporal units: their rules, and the order hints of the frames that they show.
 
     Frame headers name the slots that they build on, not the frames in there: a frame that is missing
-    shows by its number only.
+    shows by its number only. Encoders count up by one from each shown frame to the next, whatever the
+    order in which they code them.
     """
 
     def __init__(self) -> None:
         self._sequence: Av1Sequence | None = None
+        self._slots: list[int | None] = [None] * _SLOTS
         self._last: int | None = None
         self._started = False
 
     def push(self, data: bytes) -> UnitFacts:
         """See `UnitReader`."""
         sequences, broken, missing, keyframe, pictures = [], [], None, False, 0
+        shown: int | None = None
         for kind, content in obus(data):
             if kind == SEQUENCE_HEADER:
                 self._sequence = parse_sequence(BitReader(content))
@@ -103,14 +116,23 @@ class Av1Units:
                     continue
                 bits = BitReader(content[:_HEAD_BYTES])
                 if bits.flag():  # show_existing_frame
+                    shown = self._slots[bits.u(3)]
                     continue
                 frame = _frame_head(self._sequence, bits)
-                keyframe |= frame.kind == KEY_FRAME
-                missing = self._follow(self._sequence, frame) or missing
-                if not frame.shown:
+                begins = frame.kind == KEY_FRAME and frame.shown
+                keyframe |= begins
+                self._started |= begins
+                if begins:
+                    self._last = None
+                self._keep(frame)
+                if frame.shown:
+                    shown = frame.order
+                else:
                     broken.append(("hidden", "a frame that is not shown"))
                 if frame.resized:
                     broken.append(("size", "a frame with a size of its own (frame_size_override_flag)"))
+        if self._sequence is not None and pictures:
+            missing = self._follow(self._sequence, shown) or missing
         return UnitFacts(
             keyframe=keyframe,
             pictures=pictures,
@@ -121,46 +143,54 @@ class Av1Units:
             missing=missing,
         )
 
-    def _follow(self, sequence: Av1Sequence, frame: _FrameHead) -> str | None:
-        """What is missing before a frame, if anything is."""
-        last, self._last = self._last, frame.order
-        if frame.kind == KEY_FRAME:
-            self._started = True
-            return None
+    def _keep(self, frame: _FrameHead) -> None:
+        for slot in range(_SLOTS):
+            if frame.refreshed >> slot & 1:
+                self._slots[slot] = frame.order
+
+    def _follow(self, sequence: Av1Sequence, shown: int | None) -> str | None:
+        """What is missing before the frame that a unit shows, if anything is."""
         if not self._started:
             return _NOT_STARTED
+        last, self._last = self._last, shown
         if not sequence.order_bits or last is None:
             return None
         expected = (last + 1) % (1 << sequence.order_bits)
-        return None if frame.order == expected else f"order_hint {frame.order}, expected {expected}"
+        return None if shown == expected else f"order_hint {shown}, expected {expected}"
 
 
 @dataclass(frozen=True, slots=True)
 class _FrameHead:
-    """frame_type, show_frame, frame_size_override_flag and order_hint."""
+    """frame_type, show_frame, frame_size_override_flag, order_hint and refresh_frame_flags."""
 
     kind: int
     shown: bool
     resized: bool
     order: int
+    refreshed: int
 
 
 def _frame_head(sequence: Av1Sequence, bits: BitReader) -> _FrameHead:
-    """A frame header (5.9.2) behind show_existing_frame, up to its order hint."""
+    """A frame header (5.9.2) behind show_existing_frame, up to which slots it is kept in."""
     kind, shown = bits.u(2), bits.flag()
     if shown:
         bits.u(sequence.time_bits)
     else:
         bits.flag()  # showable_frame
-    if not (kind == _SWITCH_FRAME or (kind == KEY_FRAME and shown)):
-        bits.flag()  # error_resilient_mode
+    stands = kind == _SWITCH_FRAME or (kind == KEY_FRAME and shown)
+    resilient = stands or bits.flag()
     bits.flag()  # disable_cdf_update
     screen = bits.u(1) if sequence.screen_content == _SELECTED else sequence.screen_content
     if screen and sequence.integer_motion == _SELECTED:
         bits.flag()
     bits.u(sequence.id_bits)
     resized = kind == _SWITCH_FRAME or bits.flag()
-    return _FrameHead(kind, shown, resized, bits.u(sequence.order_bits))
+    order = bits.u(sequence.order_bits)
+    if not (resilient or kind in (KEY_FRAME, _INTRA_ONLY)):
+        bits.u(3)  # primary_ref_frame
+    if sequence.removal_bits and bits.flag():
+        bits.u(sequence.removal_bits)
+    return _FrameHead(kind, shown, resized, order, _ALL_SLOTS if stands else bits.u(_SLOTS))
 
 
 def parse_sequence(bits: BitReader) -> Av1Sequence:
@@ -173,7 +203,7 @@ def parse_sequence(bits: BitReader) -> Av1Sequence:
     bits.flag()  # still_picture
     if bits.flag():
         raise NalError("a sequence of one still picture")
-    time_bits = _timing_and_points(bits)
+    time_bits, removal_bits = _timing_and_points(bits)
     across, down = bits.u(4) + 1, bits.u(4) + 1
     size = bits.u(across) + 1, bits.u(down) + 1
     id_bits = 0
@@ -191,7 +221,9 @@ def parse_sequence(bits: BitReader) -> Av1Sequence:
         motion = bits.u(1)
     order_bits = bits.u(3) + 1 if has_order else 0
     bits.u(3)  # super-resolution, CDEF and restoration
-    return Av1Sequence(size, _colour(bits, profile), time_bits, id_bits, screen, motion, order_bits)
+    return Av1Sequence(
+        size, _colour(bits, profile), time_bits, id_bits, screen, motion, order_bits, removal_bits
+    )
 
 
 def _colour(bits: BitReader, profile: int) -> Sequence:
@@ -206,10 +238,10 @@ def _colour(bits: BitReader, profile: int) -> Sequence:
     return Sequence(", ".join(wrong) or None, None, Colour(full, *points))
 
 
-def _timing_and_points(bits: BitReader) -> int:
-    """Timing and operating points; returns the bits of frame_presentation_time."""
+def _timing_and_points(bits: BitReader) -> tuple[int, int]:
+    """Timing and operating points: the bits of frame_presentation_time, and of a frame's removal times."""
     equal = model = False
-    delay_bits = time_bits = 0
+    delay_bits = time_bits = removal_bits = removals = 0
     if bits.flag():
         bits.u(64)
         equal = bits.flag()
@@ -218,7 +250,8 @@ def _timing_and_points(bits: BitReader) -> int:
         model = bits.flag()
         if model:
             delay_bits = bits.u(5) + 1
-            bits.u(37)
+            bits.u(32)
+            removal_bits = bits.u(5) + 1
             time_bits = bits.u(5) + 1
     has_display_delay = bits.flag()
     for _ in range(bits.u(5) + 1):
@@ -227,6 +260,7 @@ def _timing_and_points(bits: BitReader) -> int:
             bits.flag()
         if model and bits.flag():
             bits.u(2 * delay_bits + 1)
+            removals += 1
         if has_display_delay and bits.flag():
             bits.u(4)
-    return time_bits if model and not equal else 0
+    return time_bits if model and not equal else 0, removals * removal_bits
