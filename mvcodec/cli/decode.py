@@ -24,6 +24,7 @@ from mvcodec.cli.arguments import (
 )
 from mvcodec.cli.info import count
 from mvcodec.cli.interrupt import deferred_interrupt
+from mvcodec.cli.layer_options import add_no_enhancement
 from mvcodec.cli.paths import (
     ARRAY_NAMES,
     PICTURE_NAMES,
@@ -49,6 +50,7 @@ from mvcodec.output.provenance_pictures import ProvenanceWriter
 from mvcodec.stream import StreamHeader
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.synthesizers import make_synthesizer
+from mvcodec.synthesis.towards_enhanced import TowardsEnhanced, views_near
 from mvcodec.workers import run_all
 
 MOSAIC = "mosaic"
@@ -96,9 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_synthesizer(parser)
     add_matcher(parser)
-    parser.add_argument(
-        "--no-enhancement", action="store_true", help="leave the file's enhancement layer out: the base alone"
-    )
+    add_no_enhancement(parser)
     parser.add_argument(
         "--provenance",
         action="store_true",
@@ -118,7 +118,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Decode, render every view of each frame set side by side, write."""
-    synthesizer = make_synthesizer(arguments.synthesizer)
+    synthesizer = TowardsEnhanced(make_synthesizer(arguments.synthesizer))
     form = arguments.format or _form_of(arguments)
     if arguments.json and str(arguments.output) == STANDARD:
         raise SettingError("--json", "with OUT -", "another OUT: both would be standard output")
@@ -143,8 +143,7 @@ def run(arguments: argparse.Namespace) -> None:
         check_matcher(arguments.matcher, decoder.header)
         plan = _plan(decoder.header, arguments)
         if decoder.enhanced is None:
-            places = (viewpoint.position for viewpoint in plan.viewpoints)
-            decoder.enhanced = [place for place in places if place is not None]
+            decoder.enhanced = views_near(decoder.header.array, plan.viewpoints)
         sink: Sink | None = None
         frames = 0
         try:

@@ -1,4 +1,4 @@
-"""``--enhance`` and ``--enhance-views``: the enhancement layer of ``encode``."""
+"""``--enhance`` and ``--enhance-views``: the enhancement layer of ``encode``; and ``--no-enhancement``."""
 
 from __future__ import annotations
 
@@ -21,6 +21,13 @@ def add_layer(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="R,C",
         help=settings_of(EncoderConfig)["enhance_views"].help,
+    )
+
+
+def add_no_enhancement(parser: argparse.ArgumentParser) -> None:
+    """``--no-enhancement``, for what shows views."""
+    parser.add_argument(
+        "--no-enhancement", action="store_true", help="leave the file's enhancement layer out: the base alone"
     )
 
 

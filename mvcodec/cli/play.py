@@ -35,7 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--renderer",
         choices=RENDERERS,
         help="who decodes and synthesises: the browser (web), or this program, which sends pictures; "
-        "default: web; server with --original, --synthesizer or --matcher, and for a file without maps",
+        "default: web; server with --original, --synthesizer or --matcher, for a file without maps, and for "
+        "one with enhanced views",
     )
     add_synthesizer(parser)
     add_matcher(parser)
@@ -66,7 +67,7 @@ def _renderer(arguments: argparse.Namespace) -> str:
     if asks_this_program:
         return "server"
     with McapReader.open(arguments.input, limits_of(arguments)) as reader:
-        return "server" if reader.header.version > 1 else "web"
+        return "server" if reader.header.version > 1 or reader.has_layer else "web"
 
 
 def _serve_file(arguments: argparse.Namespace) -> None:

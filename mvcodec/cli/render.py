@@ -21,6 +21,7 @@ from mvcodec.cli.arguments import (
     view,
 )
 from mvcodec.cli.info import count as counted
+from mvcodec.cli.layer_options import add_no_enhancement
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.progress import progress, tell_written
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
@@ -35,6 +36,7 @@ from mvcodec.output.picture_file import STILL_SUFFIX, WRITERS, at_rate, find_wri
 from mvcodec.output.styles import STYLES, ShotSettings, take
 from mvcodec.output.view_path import FILE_SUFFIX, SHAPES, read_waypoints, walk_shape, walk_waypoints
 from mvcodec.synthesis.synthesizers import make_synthesizer
+from mvcodec.synthesis.towards_enhanced import TowardsEnhanced, views_near
 
 QUILT = "quilt"
 FROZEN_SECONDS = 2
@@ -69,6 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_setting(parser, ShotSettings, "grid", parse=pair_of_sizes, metavar="RxC")
     add_synthesizer(parser)
     add_matcher(parser)
+    add_no_enhancement(parser)
     add_frames(parser, "frames of the file")
     add_on_error(parser, "stop")
     add_limits(parser)
@@ -78,16 +81,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Decode, render, compose and write; tell the name where it is another than OUT."""
-    synthesizer = make_synthesizer(arguments.synthesizer)
+    synthesizer = TowardsEnhanced(make_synthesizer(arguments.synthesizer))
     write = find_writer(arguments.output)
     _check_settings(arguments)
     limits = limits_of(arguments)
     with Decoder.open(
-        arguments.input, arguments.frames, arguments.on_error, limits, arguments.matcher
+        arguments.input,
+        arguments.frames,
+        arguments.on_error,
+        limits,
+        arguments.matcher,
+        enhanced=() if arguments.no_enhancement else None,
     ) as decoder:
         check_matcher(arguments.matcher, decoder.header)
         array, count = decoder.header.array, _frame_count(arguments, limits)
         places = _places(arguments, array, count)
+        if decoder.enhanced is None and arguments.style == "mono" and arguments.focus_px is None:
+            decoder.enhanced = views_near(array, places)
         sets = iter(decoder)
         first = next(sets, None)
         if first is None:

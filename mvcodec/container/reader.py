@@ -123,6 +123,11 @@ class McapReader(Closing):
         return self._chunks.size
 
     @property
+    def has_layer(self) -> bool:
+        """Whether a complete file has an enhancement layer; of others, whether one was met so far."""
+        return LAYER_TRACK.topic in self._chunks.topics
+
+    @property
     def dropped(self) -> int | None:
         """Frame sets that a live encoder left out; None where nothing is said, or not yet."""
         said = self._chunks.facts().get(DROPPED_KEY, "")

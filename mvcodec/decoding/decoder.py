@@ -51,7 +51,8 @@ class Decoder(Closing):
         matcher: estimates the maps of a stream that holds none, by name or one's own; by default the one
             that the stream's settings name. It runs when the first map of a frame set is looked at.
         enhanced: virtual views that are decoded out of the stream's enhancement layer, if it has them; by
-            default none, None: all. What is decoded is `DecodedSet.enhanced`.
+            default none, None: all. What is decoded is `DecodedSet.enhanced`. The attribute of this name may
+            be changed; others are decoded from the next keyframe on.
         name: what messages call the stream.
         threads: how many decode at once; by default as set for the process. It changes no picture.
 
@@ -132,6 +133,11 @@ class Decoder(Closing):
         if self._header is None:
             raise StreamError(self._name, "no header yet", "a header before anything else")
         return self._header
+
+    @property
+    def enhancing(self) -> frozenset[Position]:
+        """The views of the enhancement layer that are decoded since the last keyframe."""
+        return frozenset() if self._layer is None else self._layer.views
 
     @property
     def bytes_read(self) -> int:
@@ -238,18 +244,26 @@ class Decoder(Closing):
 
     def _push_layer(self, packet: Packet) -> list[DecodedSet]:
         """A packet of the enhancement layer; returns the frame set that it completes."""
-        if not self._wants_layer or self._header is None:
+        if self._header is None:
             return []
         if packet.track == LAYER_TRACK:
-            layer = EnhancementHeader.from_json(packet.data, self.header, self._assembler.label(packet))
-            if self._layer is None or self._layer.layer != layer:
-                self._layer = EnhancedViews(self.header, layer, self.enhanced, _warn)
+            self._begin_layer(packet)
             return []
         waiting = self._waiting
         if self._layer is None or waiting is None or packet.index != waiting.decoded.index:
             return []
         waiting.packets[packet.track] = packet
         return self._release() if self._layer.tracks <= waiting.packets.keys() else []
+
+    def _begin_layer(self, packet: Packet) -> None:
+        """A keyframe of the enhancement layer, where views can be joined and left."""
+        if not self._wants_layer:
+            self._layer = None
+            return
+        layer = EnhancementHeader.from_json(packet.data, self.header, self._assembler.label(packet))
+        found = self._layer
+        if found is None or (found.layer, found.wanted) != (layer, self.enhanced):
+            self._layer = EnhancedViews(self.header, layer, self.enhanced, _warn)
 
     def _release(self) -> list[DecodedSet]:
         """The frame set that waits for its enhanced views, with those that came."""

@@ -52,11 +52,16 @@ class EnhancedViews:
         wanted: Collection[Position] | None,
         tell: Callable[[StreamError, str], None],
     ) -> None:
-        self.layer, self._base, self._tell = layer, base, tell
+        self.layer, self.wanted, self._base, self._tell = layer, wanted, base, tell
         self._views = layer.needed(wanted)
         size = even_size(base.array.width, base.array.height)
         self._decoders = {each.view: PredictedTrackDecoder(size) for each in self._views}
         self._absent: set[Position] = set()
+
+    @property
+    def views(self) -> frozenset[Position]:
+        """What is decoded: the views that are wanted, and those that they build on."""
+        return frozenset(each.view for each in self._views)
 
     @property
     def tracks(self) -> set[Track]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import threading
 import time
 from collections import OrderedDict
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
+from mvcodec.array import Position
 from mvcodec.container import McapReader
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.shared_file import SharedFile
@@ -88,48 +90,83 @@ class FrameStore:
         self._cursors: list[_Cursor] = []
         self._damage: dict[int, Damage] = {}
         self._decoding = threading.Lock()
+        self._finisher: _Cursor | None = None
+        self._finishing = threading.Lock()
 
     @property
     def damages(self) -> tuple[Damage, ...]:
         """The damage that was met so far, in order."""
         return tuple(sorted(self._damage.copy().values(), key=lambda damage: damage.first))
 
-    def fetch(self, number: int) -> StoredFrame:
-        """Frame set `number` (0..count-1); decoding starts at its keyframe, unless it is at hand."""
+    def fetch(self, number: int, enhanced: Collection[Position] = ()) -> StoredFrame:
+        """Frame set `number` (0..count-1); decoding starts at its keyframe, unless it is at hand.
+
+        Args:
+            enhanced: views that are worth decoding. They join at a keyframe, so that they hold nothing up;
+                see `finish`.
+        """
+        wanted = self.table.enhanced.intersection(enhanced)
         cached = self._cache.get(number)
-        if cached is not None:
+        if cached is not None and self._cache.tried(number) >= wanted:
             return StoredFrame(number, cached, None, 0.0)
         start = time.perf_counter()
         with self._decoding:
-            decoded = self._decode(number)
+            decoded = self._decode(number, wanted)
             damage = None
             if decoded is None:
                 damage = self._damage[self.table.keyframe_before(number)]
                 decoded = self._stand_in(damage)
         return StoredFrame(number, decoded, damage, 1000 * (time.perf_counter() - start))
 
+    def finish(self, number: int, enhanced: Collection[Position]) -> StoredFrame:
+        """As `fetch`, but with these enhanced views, if the file has them; others can fetch meanwhile.
+
+        Where they were not decoded so far, decoding begins at the keyframe again.
+        """
+        wanted = self.table.enhanced.intersection(enhanced)
+        if not wanted:
+            return self.fetch(number)
+        start = time.perf_counter()
+        with self._finishing:
+            if self._cache.tried(number) >= wanted:
+                return self.fetch(number, wanted)
+            keyframe = self.table.keyframe_before(number)
+            cursor, self._finisher = self._finisher, None
+            if cursor is None or not (keyframe <= cursor.next <= number and cursor.views >= wanted):
+                if cursor is not None:
+                    cursor.close()
+                cursor = self._open_cursor(keyframe, wanted)
+            try:
+                while cursor.next <= number:
+                    decoded = self._advance(cursor)
+            except StreamError:
+                cursor.close()
+                return self.fetch(number)
+            self._finisher = cursor
+        return StoredFrame(number, decoded, None, 1000 * (time.perf_counter() - start))
+
     def close(self) -> None:
         """Let go of the file."""
-        with self._decoding:
+        with self._finishing, self._decoding:
+            if self._finisher is not None:
+                self._finisher.close()
             while self._cursors:
                 self._cursors.pop().close()
 
-    def _decode(self, number: int) -> DecodedSet | None:
+    def _decode(self, number: int, wanted: frozenset[Position] = frozenset()) -> DecodedSet | None:
         """Decode up to a frame, or return None where it is damaged."""
-        cached = self._cache.get(number)
-        if cached is not None:
-            return cached
         keyframe = self.table.keyframe_before(number)
+        cached = self._cache.get(number)
+        if cached is not None and (self._cache.tried(number) >= wanted or not self._joins(number, wanted)):
+            return cached
         known = self._damage.get(keyframe)
         if known is not None and number >= known.first:
             return None
-        cursor = self._cursor(number, keyframe)
+        cursor = self._cursor(number, keyframe, wanted)
         decoded = None
         try:
             while cursor.next <= number:
-                at = cursor.next
-                decoded = cursor.advance()
-                self._cache.put(at, decoded)
+                decoded = self._advance(cursor)
         except StreamError as error:
             self._cursors.remove(cursor)
             cursor.close()
@@ -137,16 +174,31 @@ class FrameStore:
             return None
         return decoded
 
-    def _cursor(self, number: int, keyframe: int) -> _Cursor:
+    def _joins(self, number: int, wanted: frozenset[Position]) -> bool:
+        """Whether decoding a frame set again can bring these enhanced views."""
+        keyframe = self.table.keyframe_before(number)
+        going_on = (keyframe < cursor.next <= number and cursor.views >= wanted for cursor in self._cursors)
+        return number == keyframe or any(going_on)
+
+    def _advance(self, cursor: _Cursor) -> DecodedSet:
+        at = cursor.next
+        decoded = cursor.advance()
+        return self._cache.put(at, decoded, cursor.views)
+
+    def _open_cursor(self, keyframe: int, wanted: frozenset[Position]) -> _Cursor:
+        return _Cursor(_opened(self._source), keyframe, self._limits, self._matcher, wanted)
+
+    def _cursor(self, number: int, keyframe: int, wanted: frozenset[Position]) -> _Cursor:
         """The cursor that is nearest before a frame, at its keyframe at the earliest; the last used last."""
         usable = [cursor for cursor in self._cursors if keyframe <= cursor.next <= number]
         if usable:
-            cursor = max(usable, key=lambda cursor: cursor.next)
+            cursor = max(usable, key=lambda cursor: (cursor.views >= wanted, cursor.next))
             self._cursors.remove(cursor)
         else:
             if len(self._cursors) == MAX_CURSORS:
                 self._cursors.pop(0).close()
-            cursor = _Cursor(_opened(self._source), keyframe, self._limits, self._matcher)
+            cursor = self._open_cursor(keyframe, wanted)
+        cursor.want(wanted)
         self._cursors.append(cursor)
         return cursor
 
@@ -176,23 +228,38 @@ class _Cache:
 
     def __init__(self, limit_bytes: int) -> None:
         self._limit = limit_bytes
-        self._held: OrderedDict[int, DecodedSet] = OrderedDict()
+        self._held: OrderedDict[int, tuple[DecodedSet, frozenset[Position]]] = OrderedDict()
         self._lock = threading.Lock()
 
     def get(self, number: int) -> DecodedSet | None:
         with self._lock:
             found = self._held.get(number)
-            if found is not None:
-                self._held.move_to_end(number)
-            return found
+            if found is None:
+                return None
+            self._held.move_to_end(number)
+            return found[0]
 
-    def put(self, number: int, decoded: DecodedSet) -> None:
+    def tried(self, number: int) -> frozenset[Position]:
+        """The enhanced views that a frame set was decoded with, whether they could be or not."""
+        with self._lock:
+            found = self._held.get(number)
+            return frozenset() if found is None else found[1]
+
+    def put(self, number: int, decoded: DecodedSet, tried: frozenset[Position]) -> DecodedSet:
+        """Keep a frame set, or that which is held with more enhanced views; returns what is kept."""
         room = max(MIN_CACHED, self._limit // _bytes_of(decoded))
         with self._lock:
-            self._held[number] = decoded
+            held = self._held.get(number)
+            if held is not None and held[1] >= tried:
+                decoded, tried = held
+            elif held is not None:
+                # What was made of the base by now, such as maps that took seconds, is not made again.
+                decoded = replace(held[0], enhanced=decoded.enhanced)
+            self._held[number] = decoded, tried
             self._held.move_to_end(number)
             while len(self._held) > room:
                 self._held.popitem(last=False)
+        return decoded
 
 
 def _opened(source: str | Path | SharedFile) -> str | Path | BinaryIO:
@@ -203,7 +270,9 @@ def _bytes_of(decoded: DecodedSet) -> int:
     # Pictures and maps that are made when somebody looks at them count as if they were there.
     pixels = decoded.array.height * decoded.array.width
     of_a_map = np.float32().nbytes + np.bool_().nbytes
-    return pixels * (3 * len(decoded.pictures) + of_a_map * len(decoded.disparities))
+    of_a_view = 3 + np.float32().nbytes
+    held = 3 * len(decoded.pictures) + of_a_map * len(decoded.disparities)
+    return pixels * (held + of_a_view * len(decoded.enhanced))
 
 
 class _Cursor:
@@ -214,12 +283,26 @@ class _Cursor:
     """
 
     def __init__(
-        self, source: str | Path | BinaryIO, keyframe: int, limits: Limits, matcher: str | Matcher | None
+        self,
+        source: str | Path | BinaryIO,
+        keyframe: int,
+        limits: Limits,
+        matcher: str | Matcher | None,
+        wanted: frozenset[Position],
     ) -> None:
         self.next = keyframe
-        self._reader = McapReader.open(source, limits)
+        self._reader = McapReader.open(source, limits, layer=True)
         self._packets = self._reader.packets(keyframe)
-        self._decoder = Decoder(limits=limits, matcher=matcher, name=self._reader.name)
+        self._decoder = Decoder(limits=limits, matcher=matcher, name=self._reader.name, enhanced=wanted)
+
+    @property
+    def views(self) -> frozenset[Position]:
+        """The enhanced views that it decodes."""
+        return self._decoder.enhancing
+
+    def want(self, views: frozenset[Position]) -> None:
+        """Decode these enhanced views from the next keyframe on."""
+        self._decoder.enhanced = views
 
     def advance(self) -> DecodedSet:
         """Decode one frame set.

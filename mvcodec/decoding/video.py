@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, overload
 
-from mvcodec.array import CameraArray, Viewpoint
+from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.closing import Closing
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.remote import is_url
@@ -27,6 +27,7 @@ from mvcodec.stream import StreamHeader
 from mvcodec.synthesis.provenance import Provenance
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.synthesis.synthesizers import DEFAULT_SYNTHESIZER, make_synthesizer
+from mvcodec.synthesis.towards_enhanced import TowardsEnhanced, views_near
 from mvcodec.web_player.pages import shown_in_frame, single_page
 
 STANDARD_INPUT = "-"
@@ -45,6 +46,7 @@ def open(
     on_error: OnError = "stop",
     cache_bytes: int = CACHE_BYTES,
     limits: Limits = DEFAULT_LIMITS,
+    enhancement: bool = True,
 ) -> Video:
     """Open a file of ours, to be used as a context manager: ``with mvcodec.open("x.mcap") as video:``.
 
@@ -56,13 +58,15 @@ def open(
         on_error: at damage while iterating, ``stop``: raise; ``skip``: warn, and go on at the next keyframe.
         cache_bytes: decoded frame sets are kept up to this size (and at least three of them).
         limits: what is more than that is refused.
+        enhancement: views on the places of enhanced ones are those, near to them partly; False: all views
+            are made from the base alone, and frame sets are decoded without enhanced views anyway.
 
     Raises:
         InputError: there is no such file, or the system refuses to open it.
         StreamError: not an MCAP file, one without our header, or one of a newer format version.
         SettingError: an unknown synthesizer, or a setting of it outside its range.
     """
-    return Video(source, synthesizer, matcher, on_error, cache_bytes, limits)
+    return Video(source, synthesizer, matcher, on_error, cache_bytes, limits, enhancement)
 
 
 class Video(Closing):
@@ -81,7 +85,9 @@ class Video(Closing):
         on_error: OnError,
         cache_bytes: int,
         limits: Limits,
+        enhancement: bool,
     ) -> None:
+        self._enhancement = enhancement
         self._synthesizers = _Synthesizers(synthesizer)
         self._matcher, self._on_error, self._limits = matcher, on_error, limits
         file = sys.stdin.buffer if source == STANDARD_INPUT else source
@@ -159,13 +165,16 @@ class Video(Closing):
             StreamError: it is damaged, or builds on a damaged one; with topic and time.
             InputError: the source is a pipe.
         """
-        store = self._stored
         if isinstance(number, slice):
             return (self[at] for at in range(*number.indices(len(self))))
+        return self._fetch(number, frozenset())
+
+    def _fetch(self, number: int, enhanced: frozenset[Position]) -> DecodedSet:
+        store = self._stored
         count = store.table.count
         if not -count <= number < count:
             raise NoSuchFrame(self._name, f"frame {number}", f"0..{count - 1}, or -{count}..-1 from the end")
-        found = store.fetch(number % count)
+        found = store.finish(number % count, enhanced)
         if found.damage is not None:
             raise found.damage.error
         assert found.decoded is not None
@@ -205,7 +214,8 @@ class Video(Closing):
 
         Args:
             row, col: in steps of the grid, 0..rows - 1 and 0..cols - 1; fractions are legal. On a real
-                camera's place the picture is that camera's decoded one, exactly.
+                camera's place the picture is that camera's decoded one, exactly; so it is on an enhanced
+                view's.
             frame: number of the frame set, as in ``video[frame]``.
             synthesizer: for this view; by default the one given to `mvcodec.open`.
 
@@ -215,7 +225,8 @@ class Video(Closing):
         """
         place = Viewpoint(row, col)
         self.array.check_viewpoint(place)
-        return self._synthesizers.render(self[frame], place, synthesizer)
+        near = views_near(self.array, [place]) if self._enhancement else frozenset()
+        return self._synthesizers.render(self._fetch(frame, near), place, synthesizer)
 
     def render(
         self, row: float, col: float, *, frame: int = 0, synthesizer: str | Synthesizer | None = None
@@ -285,7 +296,7 @@ class _Synthesizers:
             renderer = self._find(self._usual if asked is None else asked)
             key = id(renderer), id(decoded), place
             # The set is kept with its view, so that no other one can get its id.
-            held = self._views.pop(key, None) or (decoded, renderer.render(decoded, place))
+            held = self._views.pop(key, None) or (decoded, TowardsEnhanced(renderer).render(decoded, place))
             self._views[key] = held
             if len(self._views) > KEPT_VIEWS:
                 self._views.popitem(last=False)

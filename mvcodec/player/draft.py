@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from mvcodec.array import CameraArray
-from mvcodec.frames import DecodedSet, DisparityMap, FloatMap, Picture, RenderedView
+from mvcodec.frames import DecodedSet, DisparityMap, FinishedView, FloatMap, Picture, RenderedView
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +102,7 @@ def shrink(decoded: DecodedSet, scale: float) -> DecodedSet:
         array=array,
         pictures={camera: _shrunk_picture(picture, size) for camera, picture in decoded.pictures.items()},
         disparities={camera: _shrunk_map(item, size, scale) for camera, item in decoded.disparities.items()},
+        enhanced={view: _shrunk_view(item, size, scale) for view, item in decoded.enhanced.items()},
         disparity_range_px=(low * scale, high * scale),
     )
 
@@ -137,9 +138,15 @@ def _shrunk_picture(picture: Picture, size: tuple[int, int]) -> Picture:
 
 
 def _shrunk_map(disparity: DisparityMap, size: tuple[int, int], scale: float) -> DisparityMap:
-    # Nearest, since a mean of two surfaces lies on neither.
-    values: FloatMap = np.asarray(
-        cv2.resize(disparity.values_px, size, interpolation=cv2.INTER_NEAREST), np.float32
-    )
     valid = cv2.resize(disparity.valid.view(np.uint8), size, interpolation=cv2.INTER_NEAREST)
-    return DisparityMap(values * np.float32(scale), valid.astype(np.bool_))
+    return DisparityMap(_shrunk_values(disparity.values_px, size, scale), valid.astype(np.bool_))
+
+
+def _shrunk_view(view: FinishedView, size: tuple[int, int], scale: float) -> FinishedView:
+    return FinishedView(_shrunk_picture(view.pixels, size), _shrunk_values(view.disparity_px, size, scale))
+
+
+def _shrunk_values(values_px: FloatMap, size: tuple[int, int], scale: float) -> FloatMap:
+    # Nearest, since a mean of two surfaces lies on neither.
+    small = cv2.resize(values_px, size, interpolation=cv2.INTER_NEAREST)
+    return np.asarray(small, np.float32) * np.float32(scale)

@@ -13,17 +13,18 @@ from typing import Any
 
 import cv2
 
-from mvcodec.array import Viewpoint
+from mvcodec.array import Position, Viewpoint
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
-from mvcodec.decoding.frame_store import Damage, FrameStore
+from mvcodec.decoding.frame_store import Damage, FrameStore, StoredFrame
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.player.draft import QUICKER, SMALLER, Level, in_full_px, shrink
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.originals import Originals
-from mvcodec.player.session import PictureRequest
+from mvcodec.player.session import Enhanced, PictureRequest
 from mvcodec.player.synthesizer_pool import SynthesizerPool
 from mvcodec.synthesis.synthesizer import Preparing, Synthesizer
+from mvcodec.synthesis.towards_enhanced import TowardsEnhanced, views_near
 from mvcodec.workers import thread_count
 
 MOST_AT_ONCE = 2
@@ -98,7 +99,7 @@ class PictureMaker:
             InputError: the original's picture cannot be read.
         """
         self._wait_for(request.frame)
-        stored = self.store.fetch(request.frame)
+        stored = self._fetch(request)
         if stored.decoded is None:
             found = stored.damage.message if stored.damage else "no frame"
             raise StreamError(Path(self.store.name).name, found, "a frame that can be decoded")
@@ -106,7 +107,7 @@ class PictureMaker:
             self._begin(replace(request, frame=upcoming[0]), upcoming[1:])
         start = time.perf_counter()
         decoded, look = self._drafts.of(stored.decoded, request.level.scale), LOOKS[request.look]
-        viewpoints = look.place(decoded.array, request.viewpoint, request.eye_steps)
+        viewpoints = self._viewpoints(request)
         views = self._render(decoded, viewpoints, request.level)
         rendered = time.perf_counter()
         picture, legend = look.compose(
@@ -123,6 +124,7 @@ class PictureMaker:
             "look": request.look,
             "scale": request.level.scale,
             "quick": request.level.quick,
+            "enhanced": bool(self._near(request) & decoded.enhanced.keys()),
             "legend": legend or None,
             "decode_ms": round(stored.decode_ms, 2),
             "synthesis_ms": round(1000 * (rendered - start), 2),
@@ -137,11 +139,26 @@ class PictureMaker:
         self._ahead.shutdown(cancel_futures=True)
         self.store.close()
 
+    def _viewpoints(self, request: PictureRequest) -> tuple[Viewpoint, ...]:
+        array = self.store.table.header.array
+        return LOOKS[request.look].place(array, request.viewpoint, request.eye_steps)
+
+    def _near(self, request: PictureRequest) -> frozenset[Position]:
+        """The views that have a share in a picture if they are enhanced."""
+        return views_near(self.store.table.header.array, self._viewpoints(request))
+
+    def _fetch(self, request: PictureRequest) -> StoredFrame:
+        if request.enhanced is Enhanced.ALL:
+            return self.store.finish(request.frame, self._near(request))
+        joins = request.enhanced is Enhanced.FROM_KEYFRAMES
+        return self.store.fetch(request.frame, self._near(request) if joins else ())
+
     def _render(
         self, decoded: DecodedSet, viewpoints: tuple[Viewpoint, ...], level: Level
     ) -> list[RenderedView]:
         with self._pool_of(level).borrow(decoded) as synthesizer:
-            views = [synthesizer.render(decoded, viewpoint) for viewpoint in viewpoints]
+            shown = TowardsEnhanced(synthesizer)
+            views = [shown.render(decoded, viewpoint) for viewpoint in viewpoints]
         return [in_full_px(view, level.scale) for view in views]
 
     def _pool_of(self, level: Level) -> SynthesizerPool:
@@ -152,11 +169,11 @@ class PictureMaker:
         if self._coming is None or self._coming[1].done():
             self._coming = request.frame, self._ahead.submit(self._prepare, request)
             for frame in later:
-                self._ahead.submit(self.store.fetch, frame)
+                self._ahead.submit(self._fetch, replace(request, frame=frame))
 
     def _prepare(self, request: PictureRequest) -> None:
         """Decode a frame set and prepare it for views from about the viewpoint."""
-        stored = self.store.fetch(request.frame)
+        stored = self._fetch(request)
         if stored.decoded is None:
             return
         decoded = self._drafts.of(stored.decoded, request.level.scale)

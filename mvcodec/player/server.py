@@ -155,6 +155,7 @@ class _Viewer:
             table.count,
             stop_on_damage=broadcast.stop_on_damage,
             levels=broadcast.maker.levels,
+            enhanced=table.enhanced,
         )
         self._news = asyncio.Event()
         self._stated: dict[str, Any] | None = None
@@ -262,6 +263,7 @@ class _Viewer:
             "rows": array.rows,
             "cols": array.cols,
             "real": [list(camera) for camera in array.real],
+            "enhanced": sorted(map(list, table.enhanced)),
             "width": array.width,
             "height": array.height,
             "fps": array.fps,

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Any
 
-from mvcodec.array import CameraArray, Viewpoint
+from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.player.clock import PlayClock
 from mvcodec.player.draft import SMALLER, WHOLE, Level, Pace
 from mvcodec.player.looks import LOOKS
@@ -29,6 +30,7 @@ from mvcodec.player.messages import (
     Speed,
     Step,
 )
+from mvcodec.synthesis.towards_enhanced import views_near
 
 MAX_IN_FLIGHT = 2
 
@@ -37,6 +39,14 @@ LOOK_AHEAD = 3
 
 MOVING_S = 0.2
 """How long after its last move a viewpoint counts as moving."""
+
+
+class Enhanced(Enum):
+    """Which enhanced views are decoded for a picture."""
+
+    AT_HAND = "those that are decoded already"
+    FROM_KEYFRAMES = "they join at the next keyframe, which holds nothing up"
+    ALL = "all near ones, from the keyframe before the frame on"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +60,7 @@ class PictureRequest:
         eye_steps: distance of two eyes in steps of the grid; 0 where the look is for one.
         measure: against the original.
         level: how it is made.
+        enhanced: what is done for the enhanced views near to it.
     """
 
     frame: int
@@ -58,6 +69,7 @@ class PictureRequest:
     eye_steps: float = 0.0
     measure: bool = False
     level: Level = WHOLE
+    enhanced: Enhanced = Enhanced.AT_HAND
 
 
 class Session:
@@ -68,6 +80,7 @@ class Session:
         frame_count: of the file.
         stop_on_damage: playback stops at a damaged frame instead of going on behind it.
         levels: at which pictures can be made, from the best to the cheapest.
+        enhanced: the file's enhanced views.
     """
 
     def __init__(
@@ -77,6 +90,7 @@ class Session:
         *,
         stop_on_damage: bool = False,
         levels: Sequence[Level] = SMALLER,
+        enhanced: frozenset[Position] = frozenset(),
     ) -> None:
         self._array = array
         self._stop_on_damage = stop_on_damage
@@ -90,6 +104,7 @@ class Session:
         self._in_flight: dict[int, float] = {}
         self._pace = Pace(levels)
         self._moved_s = -math.inf
+        self._enhanced, self._keeps_up = enhanced, True
         self.transfer_ms: float | None = None
 
     @property
@@ -111,7 +126,7 @@ class Session:
                 self._ready = True
             case Move(viewpoint):
                 self._wanted = replace(self._wanted, viewpoint=self._inside(viewpoint))
-                self._moved_s = now_s
+                self._moved_s, self._keeps_up = now_s, True
             case Seek(frame):
                 clock.seek(frame, now_s)
             case Step(frames):
@@ -119,6 +134,7 @@ class Session:
                 clock.seek(clock.frame + frames, now_s)
             case Play(playing):
                 clock.play(playing, now_s)
+                self._keeps_up = True
             case Speed(factor):
                 clock.set_speed(factor, now_s)
             case Loop(loop):
@@ -141,10 +157,23 @@ class Session:
         # A picture that stands, or that is measured, is never a draft.
         if (self._clock.playing or self._moving(now_s)) and not request.measure:
             request = replace(request, level=self._pace.level)
-        if request == self._last:
-            return None
+        if self._clock.playing and self._keeps_up and not self._moving(now_s):
+            request = replace(request, enhanced=Enhanced.FROM_KEYFRAMES)
+        if self._last is not None and replace(self._last, enhanced=request.enhanced) == request:
+            if self._clock.playing or self._moving(now_s) or not self._lacks_enhanced:
+                return None
+            request = replace(request, enhanced=Enhanced.ALL)
         self._last = request
         return request
+
+    @property
+    def _lacks_enhanced(self) -> bool:
+        """Whether the last picture, should it stand, is to be made again with the enhanced views near it."""
+        last = self._last
+        if last is None or last.enhanced is Enhanced.ALL:
+            return False
+        places = LOOKS[last.look].place(self._array, last.viewpoint, last.eye_steps)
+        return bool(self._enhanced & views_near(self._array, places))
 
     def upcoming(self) -> tuple[int, ...]:
         """The frames that playback will want next, in their order; none while paused."""
@@ -156,19 +185,25 @@ class Session:
         """How long until `next_request` may have news without a message; None: not before one."""
         if not self._ready or len(self._in_flight) >= MAX_IN_FLIGHT:
             return None
-        if self._clock.playing or self._last is None or self._last.level == WHOLE:
+        final = self._last is not None and self._last.level == WHOLE and not self._lacks_enhanced
+        if self._clock.playing or self._last is None or final:
             return self._clock.seconds_to_next(now_s)
-        return max(0.0, self._moved_s + MOVING_S - now_s)  # then the whole picture follows
+        return max(0.0, self._moved_s + MOVING_S - now_s)  # then a better picture follows
 
     def overtaken(self, request: PictureRequest, now_s: float) -> bool:
-        """Whether a picture being made is not worth waiting for: a whole one, and the viewpoint moves."""
-        return request.level == WHOLE != self._pace.level and self._moving(now_s)
+        """Whether a picture being made is not worth waiting for: it takes long, and something moves."""
+        if request.enhanced is Enhanced.ALL and self._clock.playing:
+            return True
+        slow = request.level == WHOLE != self._pace.level or request.enhanced is Enhanced.ALL
+        return slow and self._moving(now_s)
 
     def made(self, request: PictureRequest, cost_s: float, drawing_s: float, now_s: float) -> None:
         """Note what a picture cost, which decides the level of the next ones."""
         moving = self._moving(now_s)
         if request.level == self._pace.level and (moving or self._clock.playing):
             self._pace.note(cost_s, drawing_s, 0.0 if moving else 1 / (self._array.fps * self._clock.speed))
+            # Drafts are no bargain for enhanced views; until something changes they are left out.
+            self._keeps_up = self._keeps_up and self._pace.level == WHOLE
 
     def sent(self, now_s: float, *, damaged: bool = False) -> int:
         """Note that a picture leaves now; returns its number, from 1, which the page repeats in `Shown`."""

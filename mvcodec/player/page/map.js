@@ -1,4 +1,4 @@
-// The small map of the array: real cameras, the viewpoint asked for (ring) and the one shown (dot).
+// The small map of the array: real cameras, enhanced views, the viewpoint asked for (ring) and the one shown (dot).
 
 const SVG = "http://www.w3.org/2000/svg";
 const MOST_DOTS = 400;
@@ -16,7 +16,7 @@ export class ArrayMap {
     });
   }
 
-  build({ rows, cols, real }) {
+  build({ rows, cols, real, enhanced }) {
     this.spans = [rows - 1, cols - 1];
     const longest = Math.max(rows - 1, cols - 1, 1);
     this.margin = MARGIN * longest;
@@ -33,6 +33,7 @@ export class ArrayMap {
       for (let row = 0; row < rows; row++) for (let col = 0; col < cols; col++) this.add("circle", { class: "view", cx: col, cy: row, r: unit });
     }
     const side = 5 * unit;
+    for (const [row, col] of enhanced) this.add("circle", { class: "enhanced", cx: col, cy: row, r: 2 * unit });
     for (const [row, col] of real) this.add("rect", { class: "real", x: col - side / 2, y: row - side / 2, width: side, height: side, rx: unit });
     this.aim = this.add("circle", { class: "aim", r: 4.5 * unit });
     this.here = this.add("circle", { class: "here", r: 2.6 * unit });

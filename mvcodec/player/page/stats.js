@@ -50,6 +50,7 @@ export class Stats {
       `transfer ${ms("transfer_ms")} ms`,
       `dropped ${this.facts.dropped}`,
     ];
+    if (this.facts.enhanced) parts.push("enhanced");
     if (this.facts.quick) parts.push("draft");
     if (this.facts.scale < 1) parts.push(`at ${Math.round(100 * this.facts.scale)} % size`);
     const spans = parts.map((text) => Object.assign(document.createElement("span"), { textContent: text }));
