@@ -76,10 +76,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: from argparse, for --help (0) and arguments that don't parse (2).
     """
-    # OpenCV writes lines of its own to standard error about files that we report; it reads this when loaded.
-    os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
-    # We hand out jobs ourselves; threads inside of BLAS wait for each other, and busily, where cores are few.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    tell_libraries()
     arguments = sys.argv[1:] if argv is None else list(argv)
     try:
         with checked_streams(), warnings.catch_warnings(), WarningLines() as lines:
@@ -106,6 +103,14 @@ def _run(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         return _fail("interrupted", EXIT_FAILURE)
     return 0
+
+
+def tell_libraries() -> None:
+    """Say what libraries must know before they are loaded, where the user has not said otherwise."""
+    # OpenCV writes lines of its own to standard error about files that we report.
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
+    # We hand out jobs ourselves; threads inside of BLAS wait for each other, and busily, where cores are few.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def command_parser(name: str) -> argparse.ArgumentParser:
