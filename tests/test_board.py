@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from boards import held, seen_by
+from command_line import mvcodec
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -199,9 +199,8 @@ def write_pictures(folder: Path, known: list[KnownCamera], board: Board, frames:
     (folder / "array.json").write_text(json.dumps(document))
 
 
-def rectify(*arguments: object) -> subprocess.CompletedProcess[str]:
-    words = [sys.executable, "-m", "mvcodec", "rectify", *map(str, arguments)]
-    return subprocess.run(words, capture_output=True, text=True, check=False)
+def rectify(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return mvcodec("rectify", *arguments)
 
 
 def test_the_command_finds_a_metric_rig_from_a_board(tmp_path: Path) -> None:

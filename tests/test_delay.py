@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from command_line import mvcodec
 
 from mvcodec.array import Position
 from mvcodec.capture import open_input
@@ -85,8 +84,7 @@ def test_cameras_in_step_and_a_scene_that_stands_still_are_no_alarm(tmp_path: Pa
 
 def rectify(*arguments: Path | str) -> str:
     """What the command says on standard error."""
-    command = [sys.executable, "-m", "mvcodec", "rectify", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    done = mvcodec("rectify", *arguments)
     assert done.returncode == 0, done.stderr
     return done.stderr
 

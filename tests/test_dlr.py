@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import heapq
-import subprocess
-import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from command_line import succeeds
 from numpy.typing import NDArray
 from stereo_scene import Planes, linear_or_grid
 
@@ -204,9 +203,7 @@ def test_help_and_errors_name_the_refinements(command: str) -> None:
     choices = matcher_choices()
     assert choices.startswith("one of joint, ")
     assert choices.endswith("given, with +dlr or +dlr-thesis behind it if wanted")
-    run = [sys.executable, "-m", "mvcodec", command, "--help"]
-    shown = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    assert choices in " ".join(shown.split()).replace("dlr- thesis", "dlr-thesis")
+    assert choices in " ".join(succeeds(command, "--help").split()).replace("dlr- thesis", "dlr-thesis")
 
 
 def test_the_encoder_takes_a_refined_matcher_by_name() -> None:

@@ -71,7 +71,8 @@ def reader(
         except SettingError as error:
             raise argparse.ArgumentTypeError(f"found {text!r}, expected {error.expected}") from None
         try:
-            known.check(value)
+            if value != AUTO:  # where the library has no such word, the command does what it says
+                known.check(value)
         except SettingError as error:
             guess = did_you_mean(text, map(str, known.choices or ()))
             raise argparse.ArgumentTypeError(f"found {text}, expected {error.expected}{guess}") from None

@@ -82,6 +82,7 @@ class EncoderConfig:
         None,
         "the least and the greatest disparity between neighbouring real cameras, px (default: estimated from"
         " the pictures, within what the input states)",
+        expected="(low, high), two numbers",
     )
     disparity_qp: int | None = setting(
         None, "constant quantiser of the maps (default: chosen for that of the pictures)"
@@ -113,7 +114,9 @@ class EncoderConfig:
         " pictures' quantiser; beside a bit rate both together hold it",
     )
     enhance_views: tuple[Position, ...] | None = setting(
-        None, "the views of the layer (default: every one that no real camera has)"
+        None,
+        "the views of the layer (default: every one that no real camera has)",
+        expected="(row, col) of each, whole numbers",
     )
     disparity_median: int | None = setting(
         None,
