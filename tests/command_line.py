@@ -1,7 +1,7 @@
 """Runs the command line as a user does: in a process of its own.
 
-It is forked from one that has the imports behind it, where that can be. What a user's start does beside, tests
-see that start `COMMAND` themselves.
+It is forked from one that has the imports behind it, where that can be. What a user's start does beside,
+tests see that start `COMMAND` themselves.
 """
 
 from __future__ import annotations

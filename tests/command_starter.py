@@ -1,7 +1,7 @@
 """Starts commands quickly: a process that has imported what they need forks one for each of them.
 
-Importing is most of a short command's time. Run as a program, it takes from a socket (the descriptor in its one
-argument) what to run, with which standard streams, and gives back how it ended.
+Importing is most of a short command's time. Run as a program, it takes from a socket (the descriptor in its
+one argument) what to run, with which standard streams, and gives back how it ended.
 """
 
 from __future__ import annotations
