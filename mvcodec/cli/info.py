@@ -101,9 +101,9 @@ def _layer(info: StreamInfo) -> str:
     assert info.layer is not None
     virtual = len(info.header.array.positions) - len(info.header.array.real)
     views = f"{len(info.layer.views)} of {count(virtual, 'virtual view')}"
-    quantizer = info.layer.settings.get("quantizer")
-    rate = "by bit rate" if quantizer is None else f"quantizer {quantizer}"
-    return f"{views} coded from their synthesis, {rate}; the base plays without"
+    asked = info.layer.settings.get("enhance")
+    quality = "" if asked is None else f", --enhance {asked}"
+    return f"{views} coded from their synthesis{quality}; the base plays without"
 
 
 def document(info: StreamInfo) -> dict[str, Any]:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import InitVar, dataclass, fields
+from dataclasses import InitVar, dataclass, fields, replace
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.encoding.layer_rate import LAYER_OFFSET, LAYER_SHARE
 from mvcodec.encoding.speed_choice import FOR_FILES, SPEEDS
 from mvcodec.errors import SettingError
 from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.matcher import Matcher
-from mvcodec.stream import DISPARITY_CAMERAS, DISPARITY_SCALES, PREDICTIONS, map_cameras
+from mvcodec.stream import DISPARITY_CAMERAS, DISPARITY_SCALES, PREDICTIONS, StreamHeader, map_cameras
 from mvcodec.video.codec import PRESETS, RateControl, check_qp
 from mvcodec.video.codecs import CODECS, find_codec
 from mvcodec.video.disparity_rate import (
@@ -34,6 +33,9 @@ PREDICTING_CAMERAS = "alternate"
 
 PREDICTING_EXTRA = 0
 """QPs, on libx264's scale, that such maps are coarser by."""
+
+LAYER_OFFSET = 6
+"""What the layer's QP is more than the pictures', on libx264's scale: fitted in `docs/prediction.md`."""
 
 DEFAULT_RATE = RateControl(qp=27)
 
@@ -143,8 +145,6 @@ class EncoderConfig:
         check_settings(self)
         if self.enhance_views is not None and self.enhance is None:
             raise SettingError("enhance_views", "given", "enhance beside it")
-        if self.prediction != "none" and self.rate.bitrate_kbps is not None:
-            raise SettingError("prediction", f"{self.prediction} with a bit rate", "qp or crf beside it")
         span = self.disparity_range_px
         if span is not None and not (math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]):
             raise SettingError("disparity_range_px", list(span), "lo < hi")
@@ -178,10 +178,17 @@ class EncoderConfig:
         return min(self.quality + LAYER_OFFSET * codec.qp_line[0], codec.max_qp)
 
     @property
-    def _base_kbps(self) -> float | None:
-        """The bit rate of all tracks of the base."""
-        kbps = self.rate.bitrate_kbps
-        return kbps if kbps is None or self.enhance != AUTO else kbps * (1 - LAYER_SHARE)
+    def shared_kbps(self) -> float | None:
+        """A bit rate that one quality of several tracks has to hold, since they build on each other."""
+        several = self.prediction != "none" or self.enhance == AUTO
+        return self.rate.bitrate_kbps if several else None
+
+    def with_quality(self, qp: int, header: StreamHeader) -> EncoderConfig:
+        """These settings with a constant quantiser, and with what a stream's header has settled."""
+        given = self.disparity_cameras
+        cameras = header.disparity_cameras if given in (None, AUTO) else given
+        scale = header.disparity_scale
+        return replace(self, rate=RateControl(qp=qp), disparity_scale=scale, disparity_cameras=cameras)
 
     def scale_for(self, array: CameraArray) -> int:
         """The scale of the maps of an array."""
@@ -212,7 +219,7 @@ class EncoderConfig:
 
     def rate_of_pictures(self, array: CameraArray) -> RateControl:
         """The rate control of one camera's pictures."""
-        kbps = self._base_kbps
+        kbps = self.rate.bitrate_kbps
         if kbps is None:
             return self.rate
         senders = map_cameras(array, self.cameras_for(array))
@@ -223,8 +230,8 @@ class EncoderConfig:
         """The rate control of one camera's maps; `range_px` is the header's."""
         if self.disparity_qp is not None:
             return RateControl(qp=self.disparity_qp)
-        if self._base_kbps is not None:
-            return _share(self._base_kbps, DISPARITY_SHARE, array)
+        if self.rate.bitrate_kbps is not None:
+            return _share(self.rate.bitrate_kbps, DISPARITY_SHARE, array)
         assert self.quality is not None
         scale, cameras = self.scale_for(array), self.cameras_for(array)
         qp = default_disparity_qp(self.quality, scale, cameras, range_px, self.codec)

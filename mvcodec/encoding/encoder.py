@@ -1,8 +1,8 @@
-"""Frame sets in, packets out: matches, quantises the maps, codes every track; see FORMAT.md."""
+"""Frame sets in, packets out: matches, and has every track coded; see FORMAT.md."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from types import TracebackType
 from typing import Any, Self
@@ -12,15 +12,15 @@ import numpy as np
 import mvcodec
 from mvcodec.array import CameraArray, Position
 from mvcodec.depth import depth_mm, warn_behind_infinity
-from mvcodec.encoding.config import EncoderConfig, default_gop, find_matcher, matcher_name
-from mvcodec.encoding.enhancer import Enhancer, enhanced_views
-from mvcodec.encoding.layer_rate import LayerRate
-from mvcodec.encoding.predicted_cameras import PredictedCameras, predicted_quantizer, prediction_order
+from mvcodec.encoding.coders import Coders
+from mvcodec.encoding.config import AUTO, EncoderConfig, default_gop, find_matcher, matcher_name
+from mvcodec.encoding.enhancer import enhanced_views
+from mvcodec.encoding.predicted_cameras import prediction_order
+from mvcodec.encoding.stream_rate import StreamRate
 from mvcodec.errors import InputError, SettingError, StreamClosed
-from mvcodec.frames import DisparityMap, FrameSet, Picture
+from mvcodec.frames import DisparityMap, FrameSet
 from mvcodec.stereo.matcher import FrameMatcher, Matcher, SelectiveMatcher
 from mvcodec.stream import (
-    HEADER_TRACK,
     Packet,
     StreamHeader,
     Track,
@@ -28,17 +28,9 @@ from mvcodec.stream import (
     view_name,
 )
 from mvcodec.video.codec import (
-    CodedPicture,
-    Planes,
     RateControl,
-    VideoEncoder,
-    VideoSettings,
 )
 from mvcodec.video.codecs import find_codec
-from mvcodec.video.colour import even_size, grey_planes, to_planes
-from mvcodec.video.disparity_code import quantise
-from mvcodec.video.map_size import coded_size, to_coded
-from mvcodec.workers import Job, settle, submit, threads
 
 __all__ = ["Encoder", "EncoderConfig", "default_gop", "find_matcher"]
 
@@ -82,16 +74,16 @@ class Encoder:
         self._matcher = matcher or find_matcher(self.config.chosen_matcher)
         self._scale = self.config.scale_for(array)
         self._median = self.config.median_for(array)
-        size = even_size(array.width, array.height)
-        rate = self.config.rate_of_pictures(array)
         several = self.config.prediction == "synthesis" and len(array.real) > 1
         self._order = prediction_order(array) if several else ()
-        alone = tuple(camera for camera in array.real if camera not in {each.camera for each in self._order})
-        self._encoders = self._make_encoders(TrackKind.TEXTURE, alone, size, rate)
-        self._predicted: PredictedCameras | None = None
-        self._enhancer: Enhancer | None = None
         asked = self.config.enhance_views
         self._layer_views = () if self.config.enhance is None else enhanced_views(array, asked)
+        self._rate: StreamRate | None = None
+        if self.config.shared_kbps is not None:
+            scale = self._codec.qp_line[0]
+            self._rate = StreamRate(self.config.shared_kbps, array.fps, self._gop, scale, self._codec.max_qp)
+        self._coders: Coders | None = None
+        self._coders_qp: int | None = None
         self._header: StreamHeader | None = None
         self._position = 0  # frame sets since the last keyframe, modulo the GOP
         self._key_ns = 0
@@ -124,9 +116,6 @@ class Encoder:
         self._check(frames)
         if self._header is None:
             self._header = self._make_header(frames)
-            self._encoders |= self._make_map_encoders(self._header)
-            self._predicted = self._make_predicted(self._header)
-            self._enhancer = self._make_enhancer(self._header)
         # Should something fail below, the next frame set starts afresh with a keyframe.
         position, self._position = self._position, 0
         if self._last is not None and frames.time_ns - self._key_ns >= KEYFRAME_NS:
@@ -134,25 +123,9 @@ class Encoder:
         numbered = self._codec.numbered and not (self._order or self._layer_views)
         if self._last is not None and frames.index != self._last.index + 1 and not numbered:
             position = 0  # else what was left out would look like what was lost
-        jobs: dict[Track, Job[list[CodedPicture]]] = {}
-        try:
-            with threads(self.config.threads):
-                self._submit(frames, position == 0, jobs)
-        finally:
-            settle(jobs.values())
-        coded = {track: job.result()[0] for track, job in jobs.items()}
-        if self._predicted is not None:
-            with threads(self.config.threads):
-                pictures = {each.camera: to_planes(frames.pictures[each.camera]) for each in self._order}
-                coded |= self._predicted.push(coded, pictures, position == 0)
-        packets = [_packet(track, frames, coded[track]) for track in self._header.tracks]
+        packets = self._code(frames, position == 0)
         if position == 0:
             self._key_ns = frames.time_ns
-            head = Packet(HEADER_TRACK, frames.index, frames.time_ns, True, self._header.to_json())
-            packets.insert(0, head)
-        if self._enhancer is not None:
-            with threads(self.config.threads):
-                packets = self._enhancer.push(packets, frames.pictures)
         if self.config.depth:
             if self._last is None:
                 maps = (found.values_px for found in self._maps.values())
@@ -164,21 +137,41 @@ class Encoder:
         self._last = frames
         return packets
 
-    def _submit(
-        self,
-        frames: FrameSet,
-        keyframe: bool,
-        jobs: dict[Track, Job[list[CodedPicture]]],
-    ) -> None:
-        """Start coding all tracks; the pictures are coded while the matcher runs."""
-        pictures = {camera: frames.pictures[camera] for camera in self.array.real}
+    def _code(self, frames: FrameSet, keyframe: bool) -> list[Packet]:
+        """The packets of a frame set, at the quality that the bit rate allows."""
+        rate = self._rate
+        if keyframe and rate is not None:
+            rate.begin()
+        packets = self._coders_at_hand(keyframe).push(frames, keyframe, lambda: self._match(frames, keyframe))
+        if rate is not None:
+            while rate.try_again(self._bits(packets)):
+                packets = self._coders_at_hand(keyframe).push(frames, keyframe, lambda: self._maps)
+            rate.spend(self._bits(packets))
+        return packets
+
+    def _bits(self, packets: Iterable[Packet]) -> int:
+        """What counts of them for the bit rate: a layer whose quality is given comes on top."""
+        uncounted = () if self.config.enhance == AUTO else (TrackKind.LAYER, TrackKind.ENHANCED)
+        return 8 * sum(len(packet.data) for packet in packets if packet.track.kind not in uncounted)
+
+    def _coders_at_hand(self, keyframe: bool) -> Coders:
+        """Those of the frame set before; at a keyframe others, where the quality changes."""
         assert self._header is not None
-        for camera, picture in pictures.items():
-            track = self._header.picture_track(camera)
-            if track in self._encoders:
-                jobs[track] = submit(self._code_picture, track, picture, keyframe)
+        qp = None if self._rate is None else self._rate.qp
+        if self._coders is None or (keyframe and qp != self._coders_qp):
+            config = self.config if qp is None else self.config.with_quality(qp, self._header)
+            if self._coders is not None:
+                self._coders.flush()
+            self._coders = Coders(self._header, config, self._gop, self._layer_views, self._coded_before)
+            self._coders_qp = qp
+        return self._coders
+
+    def _match(self, frames: FrameSet, keyframe: bool) -> Mapping[Position, DisparityMap]:
+        """The maps that are sent; every camera's, where depth is."""
+        assert self._header is not None
         if not (self._header.map_cameras or self.config.depth):
-            return
+            return {}
+        pictures = {camera: frames.pictures[camera] for camera in self.array.real}
         range_px = self._header.disparity_range_px
         if isinstance(self._matcher, FrameMatcher):
             cameras = self.array.real
@@ -189,18 +182,15 @@ class Encoder:
         else:
             cameras = self.array.real
             maps = self._matcher.match(self.array, pictures, range_px)
-        values = {camera: self._checked_map(maps, camera) for camera in cameras}
-        self._maps = values
-        for camera in self._header.map_cameras:
-            track = Track(TrackKind.DISPARITY, camera)
-            jobs[track] = submit(self._code_map, track, values[camera], keyframe)
+        self._maps = {camera: self._checked_map(maps, camera) for camera in cameras}
+        return self._maps
 
     def flush(self) -> list[Packet]:
         """End the stream. Returns nothing, since no packet waits; `push` is an error from now on."""
         if self._open:
             self._open = False
-            for encoder in self._encoders.values():
-                encoder.flush()
+            if self._coders is not None:
+                self._coders.flush()
         return []
 
     def __enter__(self) -> Self:
@@ -210,45 +200,6 @@ class Encoder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.flush()
-
-    def _make_encoders(
-        self, kind: TrackKind, cameras: tuple[Position, ...], size: tuple[int, int], rate: RateControl
-    ) -> dict[Track, VideoEncoder]:
-        settings = VideoSettings(
-            kind,
-            *size,
-            self.array.fps,
-            self._gop,
-            rate,
-            self.config.chosen_preset,
-            coded_before=self._coded_before,
-        )
-        return {Track(kind, camera): self._codec.encoder(settings) for camera in cameras}
-
-    def _make_map_encoders(self, header: StreamHeader) -> dict[Track, VideoEncoder]:
-        if not header.map_cameras:
-            return {}
-        size = coded_size(self.array.width, self.array.height, self._scale)
-        rate = self.config.rate_of_maps(self.array, header.disparity_range_px)
-        return self._make_encoders(TrackKind.DISPARITY, header.map_cameras, size, rate)
-
-    def _make_predicted(self, header: StreamHeader) -> PredictedCameras | None:
-        if not header.predicted:
-            return None
-        assert self.config.quality is not None
-        quantizer = predicted_quantizer(self.config.quality, self._codec)
-        return PredictedCameras(header, self._codec, quantizer, self.config.chosen_preset)
-
-    def _make_enhancer(self, header: StreamHeader) -> Enhancer | None:
-        if self.config.enhance is None:
-            return None
-        quantizer: int | LayerRate
-        if self.config.layer_quality is None:
-            assert self.config.rate.bitrate_kbps is not None
-            quantizer = LayerRate(self.config.rate.bitrate_kbps, self.array.fps)
-        else:
-            quantizer = predicted_quantizer(self.config.layer_quality, self._codec)
-        return Enhancer(header, self._layer_views, quantizer, self.config.chosen_preset)
 
     def _make_header(self, frames: FrameSet) -> StreamHeader:
         span = self.config.disparity_range_px
@@ -315,23 +266,8 @@ class Encoder:
             raise InputError(name, "values that are not finite", "a finite disparity at every pixel")
         return found
 
-    def _code_picture(self, track: Track, picture: Picture, keyframe: bool) -> list[CodedPicture]:
-        return self._code(track, to_planes(picture), keyframe)
-
-    def _code_map(self, track: Track, disparity: DisparityMap, keyframe: bool) -> list[CodedPicture]:
-        assert self._header is not None
-        codes = quantise(disparity.values_px, self._header.disparity_range_px)
-        return self._code(track, grey_planes(to_coded(codes, self._scale, self._median)), keyframe)
-
-    def _code(self, track: Track, planes: Planes, keyframe: bool) -> list[CodedPicture]:
-        return self._encoders[track].push(planes, keyframe)
-
 
 def _depth_packet(array: CameraArray, camera: Position, frames: FrameSet, disparity: DisparityMap) -> Packet:
     """Depth as little-endian 16-bit millimetres, row by row."""
     data = depth_mm(array, disparity.values_px).astype("<u2").tobytes()
     return Packet(Track(TrackKind.DEPTH, camera), frames.index, frames.time_ns, True, data)
-
-
-def _packet(track: Track, frames: FrameSet, picture: CodedPicture) -> Packet:
-    return Packet(track, frames.index, frames.time_ns, picture.keyframe, picture.data)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.encoding.layer_rate import MOST_TRIES, LayerRate
 from mvcodec.encoding.predicted_cameras import SPEEDS
 from mvcodec.enhancement import LAYER_TRACK, EnhancedView, EnhancementHeader
 from mvcodec.errors import SettingError
@@ -69,25 +67,23 @@ class Enhancer:
     Args:
         header: the base's.
         views: virtual ones.
-        quantizer: 0..63, or what chooses it at each keyframe.
+        quantizer: 0..63.
         preset: effort, one of PRESETS.
+        asked: what the quantizer was chosen for, for the record.
 
     Raises:
         LibvpxMissing: there is no libvpx.
     """
 
     def __init__(
-        self, header: StreamHeader, views: Sequence[Position], quantizer: int | LayerRate, preset: str
+        self, header: StreamHeader, views: Sequence[Position], quantizer: int, preset: str, asked: int | str
     ) -> None:
         size = even_size(header.array.width, header.array.height)
-        self._rate = quantizer if isinstance(quantizer, LayerRate) else None
-        first = quantizer.quantizer if isinstance(quantizer, LayerRate) else quantizer
-        self._coding = ReferenceSettings(*size, first, speed=SPEEDS[preset])
+        coding = ReferenceSettings(*size, quantizer, speed=SPEEDS[preset])
         self._order = layer_order(header.array, views)
-        said = {} if self._rate else {"quantizer": first}
-        self.header = EnhancementHeader(self._order, {**said, "speed": SPEEDS[preset]})
+        self.header = EnhancementHeader(self._order, {"enhance": asked, "speed": SPEEDS[preset]})
         self._base_header, self._base = header, StreamTracks(header)
-        self._encoders = self._fresh_encoders()
+        self._encoders = {each.view: Vp9ReferenceEncoder(coding) for each in self._order}
         sources = {other for each in self._order for other in each.references}
         self._mirrors = {each.view: Vp9ReferenceDecoder(size) for each in self._order if each.view in sources}
 
@@ -105,14 +101,7 @@ class Enhancer:
         keyframe = base[0].keyframe
         frame = FramePrediction(self._base_header, self._base.decode(base))
         index, time_ns = base[0].index, base[0].time_ns
-        if keyframe and self._rate is not None:
-            self._rate.begin()
         units = self._code_views(frame, pictures, keyframe)
-        if self._rate is not None:
-            tries = 1
-            while tries < MOST_TRIES and self._rate.try_again(_bits(units.values())):
-                units, tries = self._code_views(frame, pictures, keyframe), tries + 1
-            self._rate.spend(_bits(packet.data for packet in base), _bits(units.values()))
         packets = list(base)
         if keyframe:
             packets.insert(1, Packet(LAYER_TRACK, index, time_ns, True, self.header.to_json()))
@@ -122,10 +111,6 @@ class Enhancer:
     def _code_views(
         self, frame: FramePrediction, pictures: Mapping[Position, Picture], keyframe: bool
     ) -> dict[Position, bytes]:
-        """The units of one frame set. At a keyframe all encoders may begin with another quantizer."""
-        if keyframe and self._rate is not None and self._rate.quantizer != self._coding.quantizer:
-            self._coding = replace(self._coding, quantizer=self._rate.quantizer)
-            self._encoders = self._fresh_encoders()
         found: dict[Position, bytes] = {}
         waiting = list(self._order)
         while waiting:
@@ -144,12 +129,5 @@ class Enhancer:
             waiting = [each for each in waiting if each not in ready]
         return found
 
-    def _fresh_encoders(self) -> dict[Position, Vp9ReferenceEncoder]:
-        return {each.view: Vp9ReferenceEncoder(self._coding) for each in self._order}
-
     def _code(self, view: Position, original: Planes, prediction: list[Planes], keyframe: bool) -> bytes:
         return self._encoders[view].push(original, prediction, keyframe)
-
-
-def _bits(units: Iterable[bytes]) -> int:
-    return 8 * sum(map(len, units))
