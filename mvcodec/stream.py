@@ -327,23 +327,6 @@ def _number(fields: Fields, key: str) -> float:
     return value
 
 
-def unknown_fields(header: bytes, known: StreamHeader) -> tuple[str, ...]:
-    """Names of what a header says beside the fields of FORMAT.md; its settings are free.
-
-    Args:
-        header: as `from_json` took it.
-        known: what came of it.
-    """
-    said, expected = json.loads(header), json.loads(known.to_json())
-    names = [name for name in said if name not in expected]
-    for prefix, inside, there in (
-        ("array.", said["array"], expected["array"]),
-        ("array.calibration.", said["array"]["calibration"], expected["array"]["calibration"]),
-    ):
-        names += [prefix + name for name in inside if name not in there]
-    return tuple(names)
-
-
 def map_cameras(array: CameraArray, which: str) -> tuple[Position, ...]:
     """The real cameras that send a map, in row order; `which` is one of DISPARITY_CAMERAS."""
     if which == "all":

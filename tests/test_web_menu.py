@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from pathlib import Path
 
 import av
@@ -12,31 +11,15 @@ import numpy as np
 import pytest
 from browser_page import CHROMIUM, NO_CHROMIUM
 from numpy.typing import NDArray
-from player_files import Running, decode_picture, playing
+from player_files import decode_picture
 from playwright.sync_api import Page, expect
-from web_fixtures import Site, open_player, pixels_of, waits_for
+from web_fixtures import SAMPLE, Site, open_player, pixels_of, waits_for
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 pytest_plugins = ("web_fixtures",)
 
 PAIRS = Path(__file__).parent / "conformance"
-SAMPLE = PAIRS / "square.mcap"
-"""3 x 3 views of 64 x 48, six frames, ten a second."""
 OTHER = PAIRS / "odd_size.mcap"
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Running]:
-    with playing(SAMPLE, renderer="web") as running:
-        yield running
-
-
-@pytest.fixture
-def page(tab: Page, server: Running) -> Page:
-    """The page of `mvcodec play`, on view 1,1."""
-    tab.goto(f"{server.url}?view=1,1&t=0.2")
-    tab.evaluate("document.querySelector('mvcodec-player').ready")
-    return tab
 
 
 def settled(page: Page) -> None:
@@ -59,8 +42,8 @@ def set_slider(page: Page, label: str, value: str) -> None:
     page.get_by_label(label).fill(value)
 
 
-def test_a_file_that_is_dropped_is_shown(page: Page) -> None:
-    page.evaluate(
+def test_a_file_that_is_dropped_is_shown(sample_page: Page) -> None:
+    sample_page.evaluate(
         """(bytes) => {
             const transfer = new DataTransfer();
             transfer.items.add(new File([new Uint8Array(bytes)], "other.mcap"));
@@ -71,62 +54,62 @@ def test_a_file_that_is_dropped_is_shown(page: Page) -> None:
         }""",
         list(OTHER.read_bytes()),
     )
-    assert pixels_of(page).shape != (48, 64, 3)
+    assert pixels_of(sample_page).shape != (48, 64, 3)
 
 
-def test_a_file_that_is_chosen_is_shown(page: Page) -> None:
-    toggle_menu(page)
-    with page.expect_file_chooser() as chooser:
-        page.get_by_role("button", name="Open a file").dispatch_event("click")
+def test_a_file_that_is_chosen_is_shown(sample_page: Page) -> None:
+    toggle_menu(sample_page)
+    with sample_page.expect_file_chooser() as chooser:
+        sample_page.get_by_role("button", name="Open a file").dispatch_event("click")
     chooser.value.set_files(OTHER)
-    waits_for(page, "shown && shown.count !== 6")
+    waits_for(sample_page, "shown && shown.count !== 6")
 
 
-def test_a_copied_link_leads_back_to_the_view_and_time(page: Page) -> None:
-    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-    page.evaluate("document.querySelector('mvcodec-player').look(0.5, 1.75)")
-    page.keyboard.press("c")
-    expect(page.get_by_role("alert")).to_contain_text("Link copied")
-    link = page.evaluate("navigator.clipboard.readText()")
-    page.goto("about:blank")
-    page.goto(link)
-    page.evaluate("document.querySelector('mvcodec-player').ready")
-    waits_for(page, "shown.frame === 2 && shown.view.row === 0.5 && shown.view.col === 1.75")
+def test_a_copied_link_leads_back_to_the_view_and_time(sample_page: Page) -> None:
+    sample_page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    sample_page.evaluate("document.querySelector('mvcodec-player').look(0.5, 1.75)")
+    sample_page.keyboard.press("c")
+    expect(sample_page.get_by_role("alert")).to_contain_text("Link copied")
+    link = sample_page.evaluate("navigator.clipboard.readText()")
+    sample_page.goto("about:blank")
+    sample_page.goto(link)
+    sample_page.evaluate("document.querySelector('mvcodec-player').ready")
+    waits_for(sample_page, "shown.frame === 2 && shown.view.row === 0.5 && shown.view.col === 1.75")
 
 
-def test_a_saved_picture_is_the_view(page: Page) -> None:
-    page.evaluate("document.querySelector('mvcodec-player').look(0.5, 0.5)")
-    with page.expect_download() as download:
-        page.keyboard.press("p")
+def test_a_saved_picture_is_the_view(sample_page: Page) -> None:
+    sample_page.evaluate("document.querySelector('mvcodec-player').look(0.5, 0.5)")
+    with sample_page.expect_download() as download:
+        sample_page.keyboard.press("p")
     saved = decode_picture(np.frombuffer(Path(download.value.path()).read_bytes(), np.uint8))
     assert download.value.suggested_filename.endswith("-2.png")
-    assert np.array_equal(saved, pixels_of(page))
+    assert np.array_equal(saved, pixels_of(sample_page))
 
 
-def test_a_saved_clip_is_a_video_of_the_loop(page: Page) -> None:
-    page.keyboard.press("a")
-    page.keyboard.press("End")
-    waits_for(page, "shown.frame === 5")
-    page.keyboard.press("b")
-    toggle_menu(page)
-    with page.expect_download() as download:
-        page.get_by_text("Save clip").dispatch_event("click")
+def test_a_saved_clip_is_a_video_of_the_loop(sample_page: Page) -> None:
+    sample_page.keyboard.press("a")
+    sample_page.keyboard.press("End")
+    waits_for(sample_page, "shown.frame === 5")
+    sample_page.keyboard.press("b")
+    toggle_menu(sample_page)
+    with sample_page.expect_download() as download:
+        sample_page.get_by_text("Save clip").dispatch_event("click")
     with av.open(io.BytesIO(Path(download.value.path()).read_bytes()), "r") as container:
         pictures = [frame.to_ndarray(format="gray") for frame in container.decode(video=0)]
     assert len(pictures) >= 2
     assert np.mean(pictures[-1]) > 20
 
 
-def test_the_divider_has_the_picture_on_its_left_and_the_look_on_its_right(page: Page) -> None:
-    toggle_menu(page)
-    toggle_menu(page)
-    picture = canvas(page)
-    page.get_by_label("Show").select_option("disparity")
-    look = canvas(page)
-    toggle_menu(page)
-    set_slider(page, "Compare with the picture", "0.5")
-    toggle_menu(page)
-    both = canvas(page)
+def test_the_divider_has_the_picture_on_its_left_and_the_look_on_its_right(sample_page: Page) -> None:
+    toggle_menu(sample_page)
+    toggle_menu(sample_page)
+    picture = canvas(sample_page)
+    sample_page.get_by_label("Show").select_option("disparity")
+    look = canvas(sample_page)
+    toggle_menu(sample_page)
+    set_slider(sample_page, "Compare with the picture", "0.5")
+    toggle_menu(sample_page)
+    both = canvas(sample_page)
     middle, margin = both.shape[1] // 2, 8
     assert abs(both[:, : middle - margin] - picture[:, : middle - margin]).mean() < 1
     assert abs(both[:, middle + margin :] - look[:, middle + margin :]).mean() < 1
@@ -152,16 +135,16 @@ def test_a_focus_blurs_what_is_elsewhere_and_goes_off_again(tab: Page, site: Sit
     assert abs(canvas(tab) - sharp).mean() < 1
 
 
-def test_the_bar_shows_a_small_picture_of_the_time_under_the_pointer(page: Page) -> None:
-    page.get_by_label("Time", exact=True).hover(position={"x": 200, "y": 10})
-    expect(page.locator(".peek canvas")).to_be_visible()
-    expect(page.locator(".peek")).to_contain_text("0:00.")
-    page.mouse.move(480, 100)
-    expect(page.locator(".peek")).to_be_hidden()
+def test_the_bar_shows_a_small_picture_of_the_time_under_the_pointer(sample_page: Page) -> None:
+    sample_page.get_by_label("Time", exact=True).hover(position={"x": 200, "y": 10})
+    expect(sample_page.locator(".peek canvas")).to_be_visible()
+    expect(sample_page.locator(".peek")).to_contain_text("0:00.")
+    sample_page.mouse.move(480, 100)
+    expect(sample_page.locator(".peek")).to_be_hidden()
 
 
-def test_two_fingers_move_ahead(page: Page) -> None:
-    touch = page.context.new_cdp_session(page)
+def test_two_fingers_move_ahead(sample_page: Page) -> None:
+    touch = sample_page.context.new_cdp_session(sample_page)
 
     def fingers(kind: str, *columns: int) -> None:
         points = [{"x": x, "y": 250, "id": i} for i, x in enumerate(columns)]
@@ -171,7 +154,7 @@ def test_two_fingers_move_ahead(page: Page) -> None:
     fingers("touchMove", 400, 560)
     fingers("touchMove", 300, 660)
     fingers("touchEnd")
-    waits_for(page, "shown.dolly > 0")
+    waits_for(sample_page, "shown.dolly > 0")
 
 
 def test_an_element_with_autoplay_plays(tab: Page, site: Site) -> None:
@@ -181,30 +164,30 @@ def test_an_element_with_autoplay_plays(tab: Page, site: Site) -> None:
     waits_for(tab, "shown.frame > 0")
 
 
-def test_the_view_follows_the_pointer_until_a_key_says_no(page: Page) -> None:
-    page.mouse.move(300, 250)
-    page.mouse.move(700, 250)
-    waits_for(page, "shown.view.col > 1")
-    page.keyboard.press("h")
-    expect(page.get_by_role("status").filter(has_text="does not follow")).to_have_count(1)
-    before = page.evaluate("document.querySelector('mvcodec-player').shown.view")
-    page.mouse.move(200, 250)
-    settled(page)
-    assert page.evaluate("document.querySelector('mvcodec-player').shown.view") == before
+def test_the_view_follows_the_pointer_until_a_key_says_no(sample_page: Page) -> None:
+    sample_page.mouse.move(300, 250)
+    sample_page.mouse.move(700, 250)
+    waits_for(sample_page, "shown.view.col > 1")
+    sample_page.keyboard.press("h")
+    expect(sample_page.get_by_role("status").filter(has_text="does not follow")).to_have_count(1)
+    before = sample_page.evaluate("document.querySelector('mvcodec-player').shown.view")
+    sample_page.mouse.move(200, 250)
+    settled(sample_page)
+    assert sample_page.evaluate("document.querySelector('mvcodec-player').shown.view") == before
 
 
-def test_a_phone_that_is_turned_looks_around(page: Page) -> None:
-    page.evaluate("""() => {
+def test_a_phone_that_is_turned_looks_around(sample_page: Page) -> None:
+    sample_page.evaluate("""() => {
         for (const gamma of [0, 20]) {
             dispatchEvent(new DeviceOrientationEvent("deviceorientation", { alpha: 0, beta: 10, gamma }));
         }
     }""")
-    waits_for(page, "shown.view.col > 1 && shown.view.row === 1")
+    waits_for(sample_page, "shown.view.col > 1 && shown.view.row === 1")
 
 
-def test_a_hovered_look_says_disparity_and_metres(page: Page) -> None:
-    page.get_by_label("Show").select_option("disparity")
-    settled(page)
-    page.mouse.move(480, 250)
-    page.mouse.move(482, 252)
-    expect(page.locator(".probe")).to_contain_text("px")
+def test_a_hovered_look_says_disparity_and_metres(sample_page: Page) -> None:
+    sample_page.get_by_label("Show").select_option("disparity")
+    settled(sample_page)
+    sample_page.mouse.move(480, 250)
+    sample_page.mouse.move(482, 252)
+    expect(sample_page.locator(".probe")).to_contain_text("px")

@@ -3,35 +3,16 @@
 from __future__ import annotations
 
 import http.client
-from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
 from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS
-from player_files import Running, playing
+from player_files import Running
 from playwright.sync_api import Page, expect
-from web_fixtures import Site, open_player, pixels_of, waits_for
+from web_fixtures import SAMPLE, Site, open_player, pixels_of, waits_for
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 pytest_plugins = ("web_fixtures",)
-
-SAMPLE = Path(__file__).parent / "conformance" / "square.mcap"
-"""3 x 3 views of 64 x 48, six frames, ten a second."""
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Running]:
-    with playing(SAMPLE, renderer="web") as running:
-        yield running
-
-
-@pytest.fixture
-def page(tab: Page, server: Running) -> Page:
-    """The page of `mvcodec play`, on view 1,1."""
-    tab.goto(f"{server.url}?view=1,1&t=0.2")
-    tab.evaluate("document.querySelector('mvcodec-player').ready")
-    return tab
 
 
 def shown(page: Page) -> dict[str, object]:
@@ -39,117 +20,117 @@ def shown(page: Page) -> dict[str, object]:
     return found
 
 
-def ask(server: Running, path: str, **headers: str) -> http.client.HTTPResponse:
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+def ask(sample_server: Running, path: str, **headers: str) -> http.client.HTTPResponse:
+    connection = http.client.HTTPConnection("127.0.0.1", sample_server.port, timeout=10)
     connection.request("GET", path, headers=headers)
     return connection.getresponse()
 
 
-def test_the_server_hands_out_the_page_and_ranges_of_the_file(server: Running) -> None:
-    part = ask(server, "/video.mcap", Range="bytes=5-14")
+def test_the_server_hands_out_the_page_and_ranges_of_the_file(sample_server: Running) -> None:
+    part = ask(sample_server, "/video.mcap", Range="bytes=5-14")
     assert part.status == 206
     assert part.headers["Content-Range"] == f"bytes 5-14/{SAMPLE.stat().st_size}"
     assert part.read() == SAMPLE.read_bytes()[5:15]
-    index = ask(server, "/")
+    index = ask(sample_server, "/")
     assert "unsafe" not in index.headers["Content-Security-Policy"]
     assert "<title>square.mcap</title>" in index.read().decode()
-    assert ask(server, "/../square.json").status == 404
-    assert ask(server, "/video.mcap", Host="elsewhere.example").status == 403
+    assert ask(sample_server, "/../square.json").status == 404
+    assert ask(sample_server, "/video.mcap", Host="elsewhere.example").status == 403
 
 
-def test_the_address_says_which_view_and_time(page: Page) -> None:
-    assert shown(page)["frame"] == 2
-    assert shown(page)["view"] == {"row": 1, "col": 1}
+def test_the_address_says_which_view_and_time(sample_page: Page) -> None:
+    assert shown(sample_page)["frame"] == 2
+    assert shown(sample_page)["view"] == {"row": 1, "col": 1}
 
 
-def test_keys_step_look_and_change_what_is_shown(page: Page) -> None:
-    page.keyboard.press(".")
-    waits_for(page, "shown.frame === 3")
-    page.keyboard.press("End")
-    waits_for(page, "shown.frame === 5")
-    page.keyboard.press("ArrowRight")
-    waits_for(page, "shown.view.col > 1")
-    page.keyboard.press("v")
-    waits_for(page, "shown.look === 'disparity'")
-    page.keyboard.press("w")
-    waits_for(page, "shown.dolly > 0")
-    page.keyboard.press("i")
-    expect(page.locator(".stats")).to_contain_text("h264")
-    page.keyboard.press("?")
-    expect(page.get_by_role("dialog")).to_contain_text("look around")
+def test_keys_step_look_and_change_what_is_shown(sample_page: Page) -> None:
+    sample_page.keyboard.press(".")
+    waits_for(sample_page, "shown.frame === 3")
+    sample_page.keyboard.press("End")
+    waits_for(sample_page, "shown.frame === 5")
+    sample_page.keyboard.press("ArrowRight")
+    waits_for(sample_page, "shown.view.col > 1")
+    sample_page.keyboard.press("v")
+    waits_for(sample_page, "shown.look === 'disparity'")
+    sample_page.keyboard.press("w")
+    waits_for(sample_page, "shown.dolly > 0")
+    sample_page.keyboard.press("i")
+    expect(sample_page.locator(".stats")).to_contain_text("h264")
+    sample_page.keyboard.press("?")
+    expect(sample_page.get_by_role("dialog")).to_contain_text("look around")
 
 
-def test_space_plays_and_the_time_runs_and_loops(page: Page) -> None:
-    expect(page.locator(".time")).to_have_text("0:00.2 / 0:00.6")
-    page.keyboard.press(" ")
-    waits_for(page, "shown.isPlaying")
-    waits_for(page, "shown.frame === 5")
-    waits_for(page, "shown.frame < 2")  # it begins again
-    page.keyboard.press(" ")
-    waits_for(page, "!shown.isPlaying")
+def test_space_plays_and_the_time_runs_and_loops(sample_page: Page) -> None:
+    expect(sample_page.locator(".time")).to_have_text("0:00.2 / 0:00.6")
+    sample_page.keyboard.press(" ")
+    waits_for(sample_page, "shown.isPlaying")
+    waits_for(sample_page, "shown.frame === 5")
+    waits_for(sample_page, "shown.frame < 2")  # it begins again
+    sample_page.keyboard.press(" ")
+    waits_for(sample_page, "!shown.isPlaying")
 
 
-def test_a_section_is_played_over_and_over(page: Page) -> None:
-    page.keyboard.press("a")
-    page.keyboard.press("End")
-    waits_for(page, "shown.frame === 5")
-    page.keyboard.press("b")
-    assert shown(page)["section"] == {"from": pytest.approx(0.2), "to": pytest.approx(0.5)}
-    page.keyboard.press("b")
-    assert shown(page)["section"] is None
+def test_a_section_is_played_over_and_over(sample_page: Page) -> None:
+    sample_page.keyboard.press("a")
+    sample_page.keyboard.press("End")
+    waits_for(sample_page, "shown.frame === 5")
+    sample_page.keyboard.press("b")
+    assert shown(sample_page)["section"] == {"from": pytest.approx(0.2), "to": pytest.approx(0.5)}
+    sample_page.keyboard.press("b")
+    assert shown(sample_page)["section"] is None
 
 
-def test_dragging_looks_around_and_a_click_plays(page: Page) -> None:
-    page.mouse.move(480, 250)
-    page.mouse.down()
-    page.mouse.move(400, 250, steps=4)
-    page.mouse.up()
-    waits_for(page, "shown.view.col > 1.05")
-    assert not shown(page)["isPlaying"]
-    page.mouse.click(480, 250)
-    waits_for(page, "shown.isPlaying")
-    page.mouse.click(480, 250)
-    waits_for(page, "!shown.isPlaying")
+def test_dragging_looks_around_and_a_click_plays(sample_page: Page) -> None:
+    sample_page.mouse.move(480, 250)
+    sample_page.mouse.down()
+    sample_page.mouse.move(400, 250, steps=4)
+    sample_page.mouse.up()
+    waits_for(sample_page, "shown.view.col > 1.05")
+    assert not shown(sample_page)["isPlaying"]
+    sample_page.mouse.click(480, 250)
+    waits_for(sample_page, "shown.isPlaying")
+    sample_page.mouse.click(480, 250)
+    waits_for(sample_page, "!shown.isPlaying")
 
 
-def test_a_picture_that_is_held_gets_all_detail_when_it_is_let_go(page: Page) -> None:
-    page.evaluate("document.querySelector('mvcodec-player').settled()")
-    page.mouse.move(480, 250)
-    page.mouse.down()
-    page.mouse.move(400, 250, steps=4)
-    waits_for(page, "shown.view.col > 1.05")
-    page.evaluate("""() => {
+def test_a_picture_that_is_held_gets_all_detail_when_it_is_let_go(sample_page: Page) -> None:
+    sample_page.evaluate("document.querySelector('mvcodec-player').settled()")
+    sample_page.mouse.move(480, 250)
+    sample_page.mouse.down()
+    sample_page.mouse.move(400, 250, steps=4)
+    waits_for(sample_page, "shown.view.col > 1.05")
+    sample_page.evaluate("""() => {
         window.heldUntil = performance.now() + 500;
         document.querySelector("mvcodec-player").settled().then(() => (window.stoodAt = performance.now()));
     }""")
-    page.wait_for_function("() => performance.now() > window.heldUntil")
-    page.mouse.up()
-    page.wait_for_function("() => window.stoodAt > window.heldUntil")
+    sample_page.wait_for_function("() => performance.now() > window.heldUntil")
+    sample_page.mouse.up()
+    sample_page.wait_for_function("() => window.stoodAt > window.heldUntil")
 
 
-def test_the_wheel_moves_ahead_and_holes_stay_few(page: Page) -> None:
-    page.mouse.move(480, 250)
+def test_the_wheel_moves_ahead_and_holes_stay_few(sample_page: Page) -> None:
+    sample_page.mouse.move(480, 250)
     for _ in range(20):
-        page.mouse.wheel(0, -600)
-    waits_for(page, "shown.dolly > 0")
-    page.evaluate("document.querySelector('mvcodec-player').look(0.6, 1.3)")
-    page.get_by_label("Show").select_option("provenance")
-    waits_for(page, "shown.look === 'provenance'")
-    red = pixels_of(page).astype(int)
+        sample_page.mouse.wheel(0, -600)
+    waits_for(sample_page, "shown.dolly > 0")
+    sample_page.evaluate("document.querySelector('mvcodec-player').look(0.6, 1.3)")
+    sample_page.get_by_label("Show").select_option("provenance")
+    waits_for(sample_page, "shown.look === 'provenance'")
+    red = pixels_of(sample_page).astype(int)
     unseen = (red[..., 0] > red[..., 1] + 60) & (red[..., 0] > red[..., 2] + 60) & (red[..., 1] < 110)
     assert unseen.mean() < 0.03
 
 
-def test_the_controls_hide_when_left_alone_and_come_back(page: Page) -> None:
-    page.mouse.move(480, 200)
-    page.wait_for_selector(".stage.idle")
-    page.mouse.move(490, 210)
-    expect(page.locator(".stage.idle")).to_have_count(0)
+def test_the_controls_hide_when_left_alone_and_come_back(sample_page: Page) -> None:
+    sample_page.mouse.move(480, 200)
+    sample_page.wait_for_selector(".stage.idle")
+    sample_page.mouse.move(490, 210)
+    expect(sample_page.locator(".stage.idle")).to_have_count(0)
 
 
-def test_it_sways_until_somebody_touches_it(tab: Page, server: Running) -> None:
+def test_it_sways_until_somebody_touches_it(tab: Page, sample_server: Running) -> None:
     tab.emulate_media(reduced_motion="no-preference")
-    tab.goto(server.url)
+    tab.goto(sample_server.url)
     tab.evaluate("document.querySelector('mvcodec-player').ready")
     waits_for(tab, "shown.view.col !== 1")
     tab.keyboard.press("ArrowLeft")
@@ -159,25 +140,25 @@ def test_it_sways_until_somebody_touches_it(tab: Page, server: Running) -> None:
     assert shown(tab)["view"] == before
 
 
-def test_reduced_motion_does_not_sway(tab: Page, server: Running) -> None:
-    tab.goto(server.url)
+def test_reduced_motion_does_not_sway(tab: Page, sample_server: Running) -> None:
+    tab.goto(sample_server.url)
     tab.evaluate("document.querySelector('mvcodec-player').ready")
     tab.evaluate("new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)))")
     assert shown(tab)["view"] == {"row": 1, "col": 1}
 
 
-def test_a_picture_that_stands_is_not_drawn_again(page: Page) -> None:
-    page.evaluate("""() => {
+def test_a_picture_that_stands_is_not_drawn_again(sample_page: Page) -> None:
+    sample_page.evaluate("""() => {
         window.drawn = 0;
         document.querySelector("mvcodec-player").addEventListener("frame", () => window.drawn++);
     }""")
-    page.keyboard.press(",")
-    waits_for(page, "shown.frame === 1")
+    sample_page.keyboard.press(",")
+    waits_for(sample_page, "shown.frame === 1")
     # The picture that stands is drawn once more, with all detail; then nobody asks for another one.
-    page.evaluate("document.querySelector('mvcodec-player').settled()")
-    drawn = page.evaluate("window.drawn")
-    page.evaluate("new Promise((resolve) => setTimeout(resolve, 600))")
-    assert page.evaluate("window.drawn") == drawn
+    sample_page.evaluate("document.querySelector('mvcodec-player').settled()")
+    drawn = sample_page.evaluate("window.drawn")
+    sample_page.evaluate("new Promise((resolve) => setTimeout(resolve, 600))")
+    assert sample_page.evaluate("window.drawn") == drawn
 
 
 def test_the_element_in_another_page(tab: Page, site: Site) -> None:
@@ -215,25 +196,25 @@ def test_what_is_no_recording_is_said(tab: Page, site: Site) -> None:
     expect(tab.get_by_role("alert")).to_contain_text("not MCAP")
 
 
-def test_both_eyes_get_views_of_their_own(page: Page) -> None:
-    page.keyboard.press("e")
-    waits_for(page, "shown.eyes === 'side by side'")
-    page.wait_for_function(
+def test_both_eyes_get_views_of_their_own(sample_page: Page) -> None:
+    sample_page.keyboard.press("e")
+    waits_for(sample_page, "shown.eyes === 'side by side'")
+    sample_page.wait_for_function(
         "document.querySelector('mvcodec-player').shadowRoot.querySelector('canvas').width === 128"
     )
-    page.keyboard.press("e")
-    waits_for(page, "shown.eyes === 'anaglyph'")
+    sample_page.keyboard.press("e")
+    waits_for(sample_page, "shown.eyes === 'anaglyph'")
 
 
 @pytest.mark.parametrize(
     ("width", "height", "scheme"), [(390, 800, "light"), (1280, 720, "dark"), (2560, 1440, "dark")]
 )
 def test_the_controls_fit_the_screen(
-    tab: Page, server: Running, width: int, height: int, scheme: str
+    tab: Page, sample_server: Running, width: int, height: int, scheme: str
 ) -> None:
     tab.set_viewport_size({"width": width, "height": height})
     tab.emulate_media(color_scheme="light" if scheme == "light" else "dark", reduced_motion="reduce")
-    tab.goto(server.url)
+    tab.goto(sample_server.url)
     tab.evaluate("document.querySelector('mvcodec-player').ready")
     for label in ("Play", "Show", "Speed", "More", "Full screen", "Time"):
         box = tab.locator(".controls").get_by_label(label, exact=True).bounding_box()

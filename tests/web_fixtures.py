@@ -14,10 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 from browser_page import ARGUMENTS, CHROMIUM
+from player_files import Running, playing
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from mvcodec.frames import Picture
 from mvcodec.web_player.pages import page_files
+
+SAMPLE = Path(__file__).parent / "conformance" / "square.mcap"
+"""3 x 3 views of 64 x 48, six frames, ten a second."""
 
 
 @dataclass
@@ -110,6 +114,21 @@ def tab(chromium: Browser) -> Iterator[Page]:
     yield page
     page.close()
     assert troubles == []
+
+
+@pytest.fixture(scope="module")
+def sample_server() -> Iterator[Running]:
+    """`mvcodec play` of SAMPLE."""
+    with playing(SAMPLE, renderer="web") as running:
+        yield running
+
+
+@pytest.fixture
+def sample_page(tab: Page, sample_server: Running) -> Page:
+    """Its page, on view 1,1."""
+    tab.goto(f"{sample_server.url}?view=1,1&t=0.2")
+    tab.evaluate("document.querySelector('mvcodec-player').ready")
+    return tab
 
 
 def _is_foreign(url: str) -> bool:

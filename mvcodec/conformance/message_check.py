@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -29,6 +30,23 @@ _KINDS: dict[str, Any] = {
 _SCHEMA_NAMES = {kind: name for kind, (name, _) in schemas.PROTOBUF_SCHEMAS.items()} | {
     "depth": schemas.DEPTH_SCHEMA[0]
 }
+
+
+def unknown_fields(header: bytes, known: StreamHeader) -> tuple[str, ...]:
+    """Names of what a header says beside the fields of FORMAT.md; its settings are free.
+
+    Args:
+        header: as `from_json` took it.
+        known: what came of it.
+    """
+    said, expected = json.loads(header), json.loads(known.to_json())
+    names = [name for name in said if name not in expected]
+    for prefix, inside, there in (
+        ("array.", said["array"], expected["array"]),
+        ("array.calibration.", said["array"]["calibration"], expected["array"]["calibration"]),
+    ):
+        names += [prefix + name for name in inside if name not in there]
+    return tuple(names)
 
 
 class MessageCheck:

@@ -11,7 +11,7 @@ from typing import BinaryIO, Protocol
 from mvcodec.conformance.file_check import CheckedMessage, FileCheck
 from mvcodec.conformance.finding import Finding, error, warning
 from mvcodec.conformance.layer_check import LayerCheck
-from mvcodec.conformance.message_check import MessageCheck
+from mvcodec.conformance.message_check import MessageCheck, unknown_fields
 from mvcodec.conformance.topic_check import POINTS, VIDEO
 from mvcodec.conformance.topic_validation import TopicValidation
 from mvcodec.conformance.unit_rules import UnitRules
@@ -20,7 +20,7 @@ from mvcodec.container.declared import METADATA_NAME
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.enhancement import LAYER_TRACK
 from mvcodec.errors import InputError, StreamError
-from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, unknown_fields
+from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track
 from mvcodec.video.codecs import CODECS
 from mvcodec.video.map_size import track_sizes
 from mvcodec.video.vp9_reference import unit_codec

@@ -11,8 +11,7 @@ from mvcodec.video.codec import Codec, Planes, VideoDecoder, VideoEncoder, Video
 from mvcodec.video.h264_syntax import H264Units
 from mvcodec.video.map_model import H26X
 from mvcodec.video.pyav import PyavDecoder, PyavEncoder
-
-MAX_QP = 51
+from mvcodec.video.x26x import MAX_QP, x26x_options
 
 DECODER = "h264"
 
@@ -97,15 +96,8 @@ def h264_options(settings: VideoSettings) -> dict[str, str]:
     Raises:
         SettingError: the rate is outside of H.264's scale.
     """
-    settings.rate.check_scale(MAX_QP)
-    delay = f"{_AT_ONCE}:" if settings.low_delay else ""
-    params = f"{delay}{_ALWAYS}:keyint={settings.gop}:{X264_PARAMS[settings.kind]}"
-    return {
-        "preset": settings.preset,
-        "forced-idr": "1",
-        "x264-params": params,
-        **settings.rate.options(),
-    }
+    always = f"{_ALWAYS}:{X264_PARAMS[settings.kind]}"
+    return x26x_options("x264", settings, _AT_ONCE, always)
 
 
 H264 = Codec(

@@ -8,8 +8,7 @@ from mvcodec.video.codec import Codec, VideoDecoder, VideoEncoder, VideoSettings
 from mvcodec.video.hevc_syntax import HevcUnits
 from mvcodec.video.map_model import H26X
 from mvcodec.video.pyav import PyavDecoder, PyavEncoder
-
-MAX_QP = 51
+from mvcodec.video.x26x import MAX_QP, x26x_options
 
 DECODER = "hevc"
 
@@ -57,15 +56,8 @@ def hevc_options(settings: VideoSettings) -> dict[str, str]:
     Raises:
         SettingError: the rate is outside of HEVC's scale.
     """
-    settings.rate.check_scale(MAX_QP)
-    delay = f"{_AT_ONCE}:" if settings.low_delay else ""
-    params = f"{delay}{_ALWAYS}:keyint={settings.gop}:{X265_PARAMS[settings.kind]}"
-    return {
-        "preset": settings.preset,
-        "forced-idr": "1",
-        "x265-params": params,
-        **settings.rate.options(),
-    }
+    always = f"{_ALWAYS}:{X265_PARAMS[settings.kind]}"
+    return x26x_options("x265", settings, _AT_ONCE, always)
 
 
 HEVC = Codec(
