@@ -118,19 +118,23 @@ function median5(map: Int16Array, width: number, height: number): Uint8Array {
   const rows = [0, 0, 0, 0, 0];
   for (let y = 0; y < height; y++) {
     for (let k = 0; k < 5; k++) rows[k] = Math.min(Math.max(y + k - 2, 0), height - 1) * width;
-    const add = (x: number, by: number) => {
-      const column = Math.min(Math.max(x, 0), width - 1);
-      for (const row of rows) counts[map[row + column]] += by;
-    };
     counts.fill(0);
-    for (let x = -2; x <= 2; x++) add(x, 1);
+    for (let x = -2; x <= 2; x++) for (const row of rows) counts[map[row + Math.min(Math.max(x, 0), width - 1)]]++;
+    let code = 0;
+    let below = 0; // samples of the window that are less than `code`
     for (let x = 0; x < width; x++) {
-      let seen = 0;
-      let code = -1;
-      while (seen < 13) seen += counts[++code];
+      // The median changes little from one place to the next.
+      while (below > 12) below -= counts[--code];
+      while (below + counts[code] < 13) below += counts[code++];
       out[y * width + x] = code;
-      add(x - 2, -1);
-      add(x + 3, 1);
+      const [left, right] = [Math.max(x - 2, 0), Math.min(x + 3, width - 1)];
+      for (let k = 0; k < 5; k++) {
+        const [gone, come] = [map[rows[k] + left], map[rows[k] + right]];
+        if (gone === come) continue;
+        counts[gone]--;
+        counts[come]++;
+        below += Number(come < code) - Number(gone < code);
+      }
     }
   }
   return out;

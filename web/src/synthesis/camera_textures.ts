@@ -3,15 +3,12 @@
 import type { Header } from "../container/header.ts";
 import type { Camera } from "../geometry.ts";
 import type { Planes } from "../decode/planes.ts";
-import blocksShader from "./blocks.frag.glsl";
 import fullShader from "./full.vert.glsl";
-import { ArrayTexture, framebufferOf, makeProgram, Texture, type Program } from "./gl.ts";
+import { ArrayTexture, makeProgram, type Program } from "./gl.ts";
 import prepareShader from "./prepare.frag.glsl";
 
 /** The cameras of a cell. */
 export const SLOTS = 4;
-/** px, each way, of the blocks that bounds are kept of. */
-export const BLOCK = 8;
 /** Half-size samples that differ by no more are one surface, px. */
 const AGREEMENT_PX = 3;
 
@@ -30,9 +27,6 @@ interface Slot extends CameraFrame {
 }
 
 export class CameraTextures {
-  readonly blocks: Texture;
-  /** Blocks across and down a picture. */
-  readonly grid: readonly [number, number];
   readonly luma: ArrayTexture;
   readonly chroma: ArrayTexture;
   readonly maps: ArrayTexture;
@@ -41,30 +35,24 @@ export class CameraTextures {
   readonly #gl: WebGL2RenderingContext;
   readonly #header: Header;
   readonly #prepare: Program;
-  readonly #reduce: Program;
   readonly #slots: (Slot | undefined)[] = Array(SLOTS).fill(undefined);
   readonly #layerTarget: WebGLFramebuffer;
-  readonly #blockTarget: WebGLFramebuffer;
   readonly #pairs: Uint8Array;
-  /** What the blocks' bounds hold for; undefined: for none. */
-  #bounded: "draft" | "fine" | undefined;
+  /** Goes up with every map that comes. */
+  version = 0;
 
   constructor(gl: WebGL2RenderingContext, header: Header) {
     this.#gl = gl;
     this.#header = header;
     const { width, height, mapScale } = header;
     const [halfWidth, halfHeight] = [Math.ceil(width / 2), Math.ceil(height / 2)];
-    this.grid = [Math.ceil(width / BLOCK), Math.ceil(height / BLOCK)];
     this.#prepare = makeProgram(gl, fullShader, prepareShader);
-    this.#reduce = makeProgram(gl, fullShader, blocksShader);
     this.luma = new ArrayTexture(gl, 1, 2 * halfWidth, 2 * halfHeight, SLOTS);
     this.chroma = new ArrayTexture(gl, 2, halfWidth, halfHeight, SLOTS);
     this.maps = new ArrayTexture(gl, 1, Math.ceil(width / mapScale), Math.ceil(height / mapScale), SLOTS);
     this.pixels = new ArrayTexture(gl, 4, width, height, SLOTS);
     this.#pairs = new Uint8Array(2 * halfWidth * halfHeight);
     this.#layerTarget = gl.createFramebuffer();
-    this.blocks = new Texture(gl, 2, this.grid[0], this.grid[1] * SLOTS);
-    this.#blockTarget = framebufferOf(gl, this.blocks);
   }
 
   /** Make these cameras ready, four at most; returns each one's layer. What is there already stays. */
@@ -75,13 +63,10 @@ export class CameraTextures {
       const layer = this.#slots.findIndex((slot) => slot === undefined || !frames.some((one) => isOf(one)(slot)));
       this.#slots[layer] = { ...frame, isPrepared: false };
       this.#upload(layer, frame);
-      this.#bounded = undefined;
+      this.version++;
     }
     const layers = frames.map((frame) => this.#slots.findIndex(isOf(frame)));
     if (isFine) layers.forEach((layer) => this.#prepareLayer(layer));
-    const bounded = isFine ? "fine" : "draft";
-    if (this.#bounded !== bounded) this.#boundBlocks(isFine);
-    this.#bounded = bounded;
     return layers;
   }
 
@@ -113,21 +98,6 @@ export class CameraTextures {
     gl.uniform2f(prepare.at("uChromaTexel"), 1 / this.chroma.width, 1 / this.chroma.height);
     gl.uniform1i(prepare.at("uHalfMap"), mapScale - 1);
     gl.uniform1f(prepare.at("uAgreement"), AGREEMENT_PX / (range[1] - range[0]));
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-  }
-
-  #boundBlocks(isFine: boolean): void {
-    const gl = this.#gl;
-    const { mapScale } = this.#header;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#blockTarget);
-    gl.viewport(0, 0, this.blocks.width, this.blocks.height);
-    const reduce = this.#reduce;
-    reduce.use();
-    reduce.textures({ uMaps: this.maps });
-    gl.uniform2i(reduce.at("uMapSize"), this.maps.width, this.maps.height);
-    gl.uniform1i(reduce.at("uSamples"), BLOCK / mapScale);
-    gl.uniform1i(reduce.at("uMargin"), isFine && mapScale > 1 ? 1 : 0); // enlarging looks at the samples around
-    gl.uniform1i(reduce.at("uRows"), this.grid[1]);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 }

@@ -1,22 +1,31 @@
-// A draft's surfaces, at half the picture's size: one sample for 2 x 2 pixels, around the middle of the four.
+// A draft's surfaces: one sample for some pixels each way, where maps have one too.
 // Goes behind search.glsl; lengths are in these samples.
 
 uniform sampler2DArray uMaps;    // code values
 uniform sampler2DArray uChroma;  // Cb, Cr
 uniform int uMapStep;            // samples of a map across one of these
+uniform float uChromaStep;       // and of the chroma planes
+uniform ivec2 uChromaSize;
 
-out vec4 oSurface; // code value, Cb, Cr, and which cameras see it: one bit each
+out vec4 oSurface; // code value, Cb, Cr, and which two cameras show it: i + 4 j, by their order
 
 float codeAt(int camera, ivec2 pixel) {
-    return texelFetch(uMaps, ivec3(pixel * uMapStep, camera), 0).r;
+    return texelFetch(uMaps, ivec3(pixel * uMapStep, uLayer[camera]), 0).r;
 }
 
-// Weighted Cb and Cr of a camera, and its weight.
-vec3 chromaOf(int camera, vec2 at, float d, float seen) {
-    float weight = seen * uWeight[camera];
-    if (weight == 0.0) return vec3(0.0);
-    ivec2 place = clamp(ivec2(floor(placeOf(camera, at, d) + 0.5)), ivec2(0), uSize - 1);
-    return weight * vec3(texelFetch(uChroma, ivec3(place, camera), 0).rg, 1.0);
+// 1 for the camera that weighs most; the first one of equals.
+vec4 heaviest(vec4 weights) {
+    float most = max(max(weights.x, weights.y), max(weights.z, weights.w));
+    vec4 is = vec4(equal(weights, vec4(most)));
+    return is * vec4(1.0, 1.0 - is.x, (1.0 - is.x) * (1.0 - is.y), (1.0 - is.x) * (1.0 - is.y) * (1.0 - is.z));
+}
+
+// Cb and Cr of the camera that a vector has its 1 for. Uniforms are not indexed: GPUs in software take long for that.
+vec2 chromaOf(vec4 camera, vec2 at, float d) {
+    vec2 shift = vec2(dot(camera, vec4(uShift[0].x, uShift[1].x, uShift[2].x, uShift[3].x)), dot(camera, vec4(uShift[0].y, uShift[1].y, uShift[2].y, uShift[3].y)));
+    vec2 place = at + shift * d - uDolly.x * (d - uInfinity) * (at - uDolly.yz);
+    ivec2 pixel = clamp(ivec2(floor(place * uChromaStep + 0.5)), ivec2(0), uChromaSize - 1);
+    return texelFetch(uChroma, ivec3(pixel, int(dot(camera, vec4(uLayer)) + 0.5)), 0).rg;
 }
 
 void main() {
@@ -30,10 +39,12 @@ void main() {
     d = d == UNKNOWN ? background : d;
     // The two that count most are enough for a draft.
     vec4 weights = seen * uWeight;
-    vec2 more = max(weights.xz, weights.yw);
-    vec2 less = min(weights.xz, weights.yw);
-    float second = max(min(more.x, more.y), max(less.x, less.y));
-    seen *= vec4(greaterThanEqual(weights, vec4(second)));
-    vec3 sum = chromaOf(0, at, d, seen.x) + chromaOf(1, at, d, seen.y) + chromaOf(2, at, d, seen.z) + chromaOf(3, at, d, seen.w);
-    oSurface = vec4((d - uRange.x) / (uRange.y - uRange.x), sum.xy / sum.z, dot(seen, vec4(1.0, 2.0, 4.0, 8.0)) / 255.0);
+    vec4 first = heaviest(weights);
+    float most = dot(first, weights);
+    weights -= first * weights;
+    vec4 second = heaviest(weights);
+    float more = dot(second, weights);
+    second = more > 0.0 ? second : first;
+    vec2 chroma = (most * chromaOf(first, at, d) + more * chromaOf(second, at, d)) / (most + more);
+    oSurface = vec4((d - uRange.x) / (uRange.y - uRange.x), chroma, dot(first + 4.0 * second, vec4(0.0, 1.0, 2.0, 3.0)) / 255.0);
 }

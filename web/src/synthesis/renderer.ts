@@ -2,9 +2,8 @@
 
 import type { Header } from "../container/header.ts";
 import { contributors, infinityOf, type Viewpoint } from "../geometry.ts";
-import boundsFragment from "./bounds.frag.glsl";
-import boundsVertex from "./bounds.vert.glsl";
-import { BLOCK, CameraTextures, SLOTS, type CameraFrame } from "./camera_textures.ts";
+import { Bounds } from "./bounds.ts";
+import { CameraTextures, SLOTS, type CameraFrame } from "./camera_textures.ts";
 import draftFragment from "./draft.frag.glsl";
 import fullVertex from "./full.vert.glsl";
 import geometryFragment from "./geometry.frag.glsl";
@@ -42,8 +41,14 @@ export interface Pixels {
   readonly data: Uint8Array;
 }
 
-/** What of the cameras and the view the passes must know, by slot. */
+/** px, each way, of the tiles that a picture's bounds are kept of: larger ones cost less to make and more to search. */
+const FINE_BLOCK = 8;
+const DRAFT_BLOCK = 16;
+
+/** What of the cameras and the view the passes must know, the camera that counts most first. */
 interface Seen {
+  readonly count: number;
+  readonly layers: Int32Array;
   readonly shifts: Float32Array;
   readonly weights: Float32Array;
   readonly dolly: number;
@@ -61,11 +66,9 @@ export class ViewRenderer {
   readonly gl: WebGL2RenderingContext;
   readonly #header: Header;
   readonly #cameras: CameraTextures;
-  readonly #bounds: Program;
+  readonly #fineBounds: Bounds;
+  readonly #draftBounds: Bounds;
   readonly #view: Program;
-  readonly #near: Texture;
-  readonly #far: Texture;
-  readonly #boundsTarget: WebGLFramebuffer;
   readonly #geometry: Program;
   readonly #draft: Program;
   readonly #surface: Texture;
@@ -78,11 +81,8 @@ export class ViewRenderer {
     this.gl = gl as WebGL2RenderingContext;
     this.#header = header;
     this.#cameras = new CameraTextures(this.gl, header);
-    const [across, down] = this.#cameras.grid;
-    this.#near = new Texture(this.gl, 4, across, down);
-    this.#far = new Texture(this.gl, 4, across, down);
-    this.#boundsTarget = framebufferOf(this.gl, this.#near, this.#far);
-    this.#bounds = makeProgram(this.gl, boundsVertex, boundsFragment);
+    this.#fineBounds = new Bounds(this.gl, header, FINE_BLOCK, header.mapScale > 1 ? 1 : 0); // enlarging looks at the samples around
+    this.#draftBounds = new Bounds(this.gl, header, DRAFT_BLOCK, 0);
     this.#view = makeProgram(this.gl, fullVertex, searchShader + viewFragment);
     const { width, height } = this.#cameras.chroma;
     this.#surface = new Texture(this.gl, 4, width, height);
@@ -100,15 +100,19 @@ export class ViewRenderer {
     const at = (frame: CameraFrame, row: number, col: number) => frame.camera.row === row && frame.camera.col === col;
     const seeing = contributors(this.#header, view, ({ row, col }) => frames.some((frame) => at(frame, row, col)));
     const own = seeing.find(({ camera }) => camera.row === view.row && camera.col === view.col);
-    const used = own === undefined || settings.dolly !== 0 ? seeing : [own];
+    const used = own === undefined || settings.dolly !== 0 ? seeing.sort((a, b) => b.weight - a.weight) : [own];
     const isDraft = !settings.fine && settings.look === "picture" && !settings.raw;
     const layers = this.#cameras.place(used.map(({ camera }) => frames.find((frame) => at(frame, camera.row, camera.col))!), !isDraft);
-    const seen = { shifts: new Float32Array(2 * SLOTS), weights: new Float32Array(SLOTS), dolly: settings.dolly };
+    const seen: Seen = {
+      count: used.length, layers: new Int32Array(SLOTS), shifts: new Float32Array(2 * SLOTS), weights: new Float32Array(SLOTS), dolly: settings.dolly,
+    };
+    seen.layers.set(layers);
     used.forEach(({ shift, weight }, i) => {
-      seen.shifts.set(shift, 2 * layers[i]);
-      seen.weights[layers[i]] = weight;
+      seen.shifts.set(shift, 2 * i);
+      seen.weights[i] = weight;
     });
-    this.#drawBounds(seen);
+    const bounds = isDraft ? this.#draftBounds : this.#fineBounds;
+    bounds.draw(this.#cameras.maps, this.#cameras.version, seen.count, (program) => this.#describe(program, seen, 1, 0));
     if (isDraft) this.#drawDraft(seen, settings, area, target);
     else this.#drawView(seen, settings, area, target);
   }
@@ -143,45 +147,36 @@ export class ViewRenderer {
     return { width, height, data };
   }
 
-  #drawBounds(seen: Seen): void {
-    const { gl } = this;
-    const [across, down] = this.#cameras.grid;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#boundsTarget);
-    gl.viewport(0, 0, across, down);
-    gl.clearColor(0, 0, 0, 0);
-    gl.clear(gl.COLOR_BUFFER_BIT);
-    gl.enable(gl.BLEND);
-    gl.blendEquation(gl.MAX);
-    this.#bounds.use();
-    this.#bounds.textures({ uBlocks: this.#cameras.blocks });
-    gl.uniform2i(this.#bounds.at("uGrid"), across, down);
-    this.#describe(this.#bounds, seen, 1);
-    gl.drawArrays(gl.POINTS, 0, across * down * SLOTS);
-    gl.disable(gl.BLEND);
-  }
-
-  /** Surfaces at half size, then each pixel's brightness. */
+  /** Surfaces at one place of 2 x 2 pixels, or of 4 x 4 for a smaller picture, then each pixel's brightness. */
   #drawDraft(seen: Seen, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
     const { gl } = this;
     const { luma, chroma, maps } = this.#cameras;
-    const { width, height } = this.#surface;
+    const { width, height, mapScale } = this.#header;
+    const step = area.width < width ? 4 : 2;
+    const first = (mapScale - 1) / 2; // the middle of a map's first sample
+    const [across, down] = [Math.ceil(width / step), Math.ceil(height / step)];
     const geometry = this.#geometry;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#geometryTarget);
-    gl.viewport(0, 0, width, height);
+    gl.viewport(0, 0, across, down);
     geometry.use();
-    geometry.textures({ uMaps: maps, uChroma: chroma, uNear: this.#near, uFar: this.#far });
-    this.#describe(geometry, seen, 0.5);
-    gl.uniform1f(geometry.at("uTile"), BLOCK / 2);
-    gl.uniform2i(geometry.at("uSize"), width, height);
-    gl.uniform1i(geometry.at("uMapStep"), 2 / this.#header.mapScale);
+    geometry.textures({ uMaps: maps, uChroma: chroma, uNear: this.#draftBounds.near, uFar: this.#draftBounds.far });
+    this.#describe(geometry, seen, 1 / step, first);
+    gl.uniform1f(geometry.at("uTile"), DRAFT_BLOCK / step);
+    gl.uniform2i(geometry.at("uSize"), across, down);
+    gl.uniform1i(geometry.at("uTwoSuffice"), 1);
+    gl.uniform1i(geometry.at("uMapStep"), step / mapScale);
+    gl.uniform1f(geometry.at("uChromaStep"), step / 2);
+    gl.uniform2i(geometry.at("uChromaSize"), chroma.width, chroma.height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
 
     const draft = this.#draft;
     draft.use();
     draft.textures({ uSurface: this.#surface, uLuma: luma });
-    this.#describe(draft, seen, 1);
-    gl.uniform2i(draft.at("uSize"), this.#header.width, this.#header.height);
-    gl.uniform2i(draft.at("uHalfSize"), width, height);
+    this.#describe(draft, seen, 1, 0);
+    gl.uniform2i(draft.at("uSize"), width, height);
+    gl.uniform1f(draft.at("uStep"), step);
+    gl.uniform1f(draft.at("uFirst"), first);
+    gl.uniform2i(draft.at("uSurfaceSize"), across, down);
     gl.uniform2f(draft.at("uLumaTexel"), 1 / luma.width, 1 / luma.height);
     this.#drawArea(draft, settings, area, target);
   }
@@ -190,9 +185,10 @@ export class ViewRenderer {
     const { gl } = this;
     const view = this.#view;
     view.use();
-    view.textures({ uCameras: this.#cameras.pixels, uNear: this.#near, uFar: this.#far });
-    this.#describe(view, seen, 1);
-    gl.uniform1f(view.at("uTile"), BLOCK);
+    view.textures({ uCameras: this.#cameras.pixels, uNear: this.#fineBounds.near, uFar: this.#fineBounds.far });
+    this.#describe(view, seen, 1, 0);
+    gl.uniform1f(view.at("uTile"), FINE_BLOCK);
+    gl.uniform1i(view.at("uTwoSuffice"), 0);
     gl.uniform2i(view.at("uSize"), this.#header.width, this.#header.height);
     gl.uniform1f(view.at("uWipe"), settings.wipe ?? 0);
     gl.uniform1i(view.at("uLook"), settings.raw ? RAW : LOOKS.indexOf(settings.look));
@@ -222,15 +218,15 @@ export class ViewRenderer {
     gl.colorMask(true, true, true, true);
   }
 
-  /** What all passes must know of the cameras and the view; `scale`: samples of the pass across a px. */
-  #describe(program: Program, { shifts, weights, dolly }: Seen, scale: number): void {
+  /** What all passes must know of the cameras and the view; `scale`: samples of the pass across a px, the first one at `first` px. */
+  #describe(program: Program, { layers, shifts, weights, dolly }: Seen, scale: number, first: number): void {
     const { gl } = this;
     const { width, height, range } = this.#header;
+    gl.uniform4iv(program.at("uLayer"), layers);
     gl.uniform2fv(program.at("uShift"), shifts.map((shift) => scale * shift));
     gl.uniform4fv(program.at("uWeight"), weights);
     gl.uniform2f(program.at("uRange"), ...range);
-    // Sample 0 is the middle of the first pixels that it stands for.
-    gl.uniform3f(program.at("uDolly"), dolly, (scale * width - 1) / 2, (scale * height - 1) / 2);
+    gl.uniform3f(program.at("uDolly"), dolly, scale * ((width - 1) / 2 - first), scale * ((height - 1) / 2 - first));
     gl.uniform1f(program.at("uInfinity"), infinityOf(this.#header));
   }
 }

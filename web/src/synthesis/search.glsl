@@ -9,7 +9,9 @@ uniform sampler2D uNear;         // per tile, in each camera's channel: the larg
 uniform sampler2D uFar;          // likewise 1 - the smallest
 uniform float uTile;             // samples across a tile
 uniform vec2 uShift[4];          // samples from the view to the camera for each px of disparity
-uniform vec4 uWeight;            // 0: this camera does not count
+uniform vec4 uWeight;            // of the cameras, falling; 0: this one does not count
+uniform bool uTwoSuffice;        // the others are not asked where the two cameras that count most agree
+uniform ivec4 uLayer;            // of each camera in the array textures
 uniform vec2 uRange;             // px that the code values 0 and 1 mean
 uniform vec3 uDolly;             // how far ahead of the cameras' plane the view stands, 1 / px; the place it moves to
 uniform float uInfinity;         // disparity of infinitely distant points, px
@@ -99,8 +101,11 @@ float surfaceAt(vec2 at, out vec4 found, out float background, out bool isEdge) 
     vec4 isThere = vec4(greaterThan(near, vec4(0.0)));
     if (near.x > 0.0) found.x = search(0, at, nears.x, fars.x);
     if (near.y > 0.0) found.y = search(1, at, nears.y, fars.y);
-    if (near.z > 0.0) found.z = search(2, at, nears.z, fars.z);
-    if (near.w > 0.0) found.w = search(3, at, nears.w, fars.w);
+    int rest = uTwoSuffice && found.y != UNKNOWN && abs(found.x - found.y) <= TOLERANCE ? 0 : 1;
+    for (int once = 0; once < rest; once++) {
+        if (near.z > 0.0) found.z = search(2, at, nears.z, fars.z);
+        if (near.w > 0.0) found.w = search(3, at, nears.w, fars.w);
+    }
     vec4 far4 = mix(uRange.yyyy, fars, isThere);
     vec4 near4 = mix(uRange.xxxx, nears, isThere);
     background = min(min(far4.x, far4.y), min(far4.z, far4.w));

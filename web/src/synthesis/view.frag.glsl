@@ -25,7 +25,7 @@ const int DISAGREEMENT = 4;
 const int RAW = 5;              // disparity in 16 bits, for programs
 
 float codeAt(int camera, ivec2 pixel) {
-    return texelFetch(uCameras, ivec3(pixel, camera), 0).a;
+    return texelFetch(uCameras, ivec3(pixel, uLayer[camera]), 0).a;
 }
 
 float surfaceAt(vec2 at) {
@@ -44,7 +44,7 @@ vec4 cubicWeights(float t) {
 }
 
 vec4 linear(vec2 at, int camera) {
-    return texture(uCameras, vec3((at + 0.5) / vec2(uSize), camera));
+    return texture(uCameras, vec3((at + 0.5) / vec2(uSize), uLayer[camera]));
 }
 
 // Cubic convolution in nine linear fetches: the two inner weights have one sign.
@@ -71,7 +71,7 @@ vec4 beside(vec2 at, int camera, float d) {
     vec4 sum = vec4(0.0);
     for (int k = 0; k < 4; k++) {
         ivec2 offset = ivec2(k & 1, k >> 1);
-        vec4 pixel = texelFetch(uCameras, ivec3(min(base + offset, uSize - 1), camera), 0);
+        vec4 pixel = texelFetch(uCameras, ivec3(min(base + offset, uSize - 1), uLayer[camera]), 0);
         vec2 share = mix(1.0 - part, part, vec2(offset));
         float weight = abs(px(pixel.a) - d) <= TOLERANCE ? share.x * share.y : 0.0;
         sum += weight * vec4(pixel.rgb, 1.0);
