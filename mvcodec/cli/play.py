@@ -8,13 +8,18 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from typing import TYPE_CHECKING
 
+from mvcodec.array import CameraArray
 from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_matcher, add_synthesizer, check_matcher
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.container.reader import McapReader
-from mvcodec.errors import SettingError, require_packages
+from mvcodec.errors import require_packages
 from mvcodec.synthesis.synthesizers import make_synthesizer, quicker_synthesizer
+
+if TYPE_CHECKING:
+    from mvcodec.player.originals import Originals
 
 EXTRA = "play"
 PACKAGES = ("starlette", "uvicorn", "websockets")
@@ -35,8 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--renderer",
         choices=RENDERERS,
         help="who decodes and synthesises: the browser (web), or this program, which sends pictures; "
-        "default: web; server with --original, --synthesizer or --matcher, for a file without maps, and for "
-        "one with enhanced views",
+        "default: web; server with --synthesizer or --matcher, for a file without maps, and for one with "
+        "enhanced views",
     )
     add_synthesizer(parser)
     add_matcher(parser)
@@ -47,8 +52,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Serve the page until Ctrl-C."""
     require_packages(PACKAGES, EXTRA)
-    if arguments.renderer == "web" and arguments.original is not None:
-        raise SettingError("original", arguments.original, "`renderer` server with it")
     if _renderer(arguments) == "web":
         _serve_file(arguments)
     else:
@@ -59,12 +62,7 @@ def _renderer(arguments: argparse.Namespace) -> str:
     """Who renders: as asked, else whoever can do what is asked for."""
     if arguments.renderer is not None:
         return str(arguments.renderer)
-    asks_this_program = (
-        arguments.original is not None
-        or arguments.matcher is not None
-        or arguments.synthesizer != DEFAULT_SYNTHESIZER
-    )
-    if asks_this_program:
+    if arguments.matcher is not None or arguments.synthesizer != DEFAULT_SYNTHESIZER:
         return "server"
     with McapReader.open(arguments.input, limits_of(arguments)) as reader:
         return "server" if reader.header.version > 1 or reader.has_layer else "web"
@@ -75,9 +73,16 @@ def _serve_file(arguments: argparse.Namespace) -> None:
     from mvcodec.player.serving import serve
     from mvcodec.player.web_server import make_web_app
 
-    with McapReader.open(arguments.input, limits_of(arguments)):  # what is no file of ours is told at once
-        pass
-    _serve(serve, partial(make_web_app, arguments.input), arguments)
+    with McapReader.open(arguments.input, limits_of(arguments)) as reader:
+        array = reader.header.array  # what is no file of ours is told at once
+    _serve(serve, partial(make_web_app, arguments.input, _originals(arguments, array)), arguments)
+
+
+def _originals(arguments: argparse.Namespace, array: CameraArray) -> Originals | None:
+    from mvcodec.capture import open_input
+    from mvcodec.player.originals import Originals
+
+    return None if arguments.original is None else Originals(open_input([arguments.original]), array)
 
 
 def _serve(serve: Callable[..., None], make: Callable[..., object], arguments: argparse.Namespace) -> None:
@@ -93,8 +98,6 @@ def _serve(serve: Callable[..., None], make: Callable[..., object], arguments: a
 
 def _serve_pictures(arguments: argparse.Namespace) -> None:
     """This program decodes and synthesises, and sends pictures."""
-    from mvcodec.capture import open_input
-    from mvcodec.player.originals import Originals
     from mvcodec.player.picture_maker import PictureMaker
     from mvcodec.player.server import Broadcast, make_app
     from mvcodec.player.serving import serve
@@ -112,8 +115,7 @@ def _serve_pictures(arguments: argparse.Namespace) -> None:
     )
     try:
         check_matcher(arguments.matcher, maker.store.table.header)
-        if arguments.original is not None:
-            maker.originals = Originals(open_input([arguments.original]), maker.store.table.header.array)
+        maker.originals = _originals(arguments, maker.store.table.header.array)
         broadcast = Broadcast(
             maker,
             title=arguments.input.name,

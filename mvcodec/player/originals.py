@@ -1,4 +1,4 @@
-"""How good the picture is: PSNR and SSIM against the original array, where it has a view at that place."""
+"""The original array: its pictures, and how good a view is against them where it has one at that place."""
 
 from __future__ import annotations
 
@@ -48,15 +48,27 @@ class Originals:
         place = view.viewpoint.position
         if place is None:
             return Quality(None, None, "no original between the grid's places (g goes to the nearest)")
-        number = decoded.index - self._source.first_frame
-        if not 0 <= number < self._source.frame_count:
+        original = self.picture(decoded.index, place)
+        if original is None:
             return Quality(None, None, f"the original has no frame {decoded.index}")
         if min(view.pixels.shape[:2]) < SSIM_WINDOW:
-            return Quality(psnr(self._picture(number, place), view.pixels), None)
-        original = self._picture(number, place)
+            return Quality(psnr(original, view.pixels), None)
         return Quality(psnr(original, view.pixels), ssim(original, view.pixels))
 
-    def _picture(self, number: int, place: Position) -> Picture:
+    def picture(self, index: int, place: Position) -> Picture | None:
+        """The original of a view, uint8 (H, W, 3) RGB; None where there is none.
+
+        Args:
+            index: of its frame set in the encoder's input.
+
+        Raises:
+            InputError: the original's picture cannot be read.
+        """
+        number = index - self._source.first_frame
+        array = self._source.array
+        is_there = 0 <= place[0] < array.rows and 0 <= place[1] < array.cols
+        if not is_there or not 0 <= number < self._source.frame_count:
+            return None
         with self._lock:
             found = self._cache.get((number, place))
             if found is None:

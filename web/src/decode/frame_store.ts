@@ -56,6 +56,12 @@ export class FrameStore {
     return found.filter((one) => one !== undefined);
   }
 
+  /** The number that a frame has in the encoder's input; undefined where it is damaged. */
+  async sequence(frame: number): Promise<number | undefined> {
+    const span = spanAt(this.#recording.spans, frame);
+    return (await this.#recording.load(span))[frame - span.first]?.sequence;
+  }
+
   /** A track's decoded picture; undefined where it is missing or damaged. */
   async planes(topic: string, frame: number, isWanted: () => boolean = () => true): Promise<Planes | undefined> {
     const name = `${topic}@${frame}`;

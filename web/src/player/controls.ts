@@ -86,6 +86,11 @@ export class Controls {
     this.#range = range;
   }
 
+  /** Whether there is something to compare with. */
+  offerOriginals(areThere: boolean): void {
+    for (const option of this.#look.options) if (option.value === "difference") option.hidden = option.disabled = !areThere;
+  }
+
   offerHeadset(isThere: boolean): void {
     this.#headset.hidden = !isThere;
   }

@@ -8,6 +8,7 @@ import { element } from "./dom.ts";
 import type { Eyes } from "./drawing.ts";
 import { Engine } from "./engine.ts";
 import { parseView } from "./format.ts";
+import type { Opening } from "./shown.ts";
 import styles from "./style.css";
 import { TEXTS } from "./texts.ts";
 import { Ui } from "./ui.ts";
@@ -83,12 +84,12 @@ export class MvcodecPlayer extends HTMLElement {
   }
 
   /** Show a file: its address, or one that the page has. Resolves as `ready` does. */
-  open(from: string | Blob, at: { seconds?: number; view?: Viewpoint | undefined } = {}): Promise<void> {
+  open(from: string | Blob, at: Opening = {}): Promise<void> {
     this.#engine?.close();
     const engine = new Engine(this.#canvas, {
       onFrame: () => {
         this.#ui.drawn();
-        const detail: FrameDetail = { frame: engine.frame, seconds: engine.timeOf(engine.frame), view: engine.shown.view };
+        const detail: FrameDetail = { frame: engine.frame, seconds: engine.timeOf(engine.frame), view: engine.view };
         this.dispatchEvent(new CustomEvent("frame", { detail }));
       },
       onState: () => this.#ui.update(),
@@ -125,9 +126,9 @@ export class MvcodecPlayer extends HTMLElement {
   get shown(): ShownState | undefined {
     const engine = this.#engine;
     if (!engine?.isOpen) return undefined;
-    const { view, look, dolly, eyes } = engine.shown;
+    const { look, dolly, eyes } = engine.shown;
     const { isPlaying, speed, section = null } = engine.playback;
-    const { frame, count, immersed = null } = engine;
+    const { frame, count, view, immersed = null } = engine;
     return { frame, count, view, look, dolly, eyes: eyes.mode, immersed, isPlaying, speed, section };
   }
 
@@ -151,6 +152,7 @@ export class MvcodecPlayer extends HTMLElement {
     const at = {
       seconds: Math.max(Number(asked.get("t") ?? 0) || 0, 0),
       view: parseView(asked.get("view") ?? this.getAttribute("view")),
+      originals: asked.has("src") ? undefined : (this.getAttribute("originals") ?? undefined),
     };
     const embedded = isPage ? document.getElementById("recording") : null;
     const src = asked.get("src") ?? this.getAttribute("src");
@@ -160,13 +162,13 @@ export class MvcodecPlayer extends HTMLElement {
   }
 
   /** A recording that lies in the page itself, as base64. */
-  async #openEmbedded(text: string, at: { seconds: number; view: Viewpoint | undefined }): Promise<void> {
+  async #openEmbedded(text: string, at: Opening): Promise<void> {
     const bytes = fetch(`data:application/octet-stream;base64,${text}`).then((answer) => answer.blob());
     this.#ready = bytes.then((blob) => this.open(blob, at));
     return this.#ready;
   }
 
-  async #start(engine: Engine, from: string | Blob, at: { seconds?: number; view?: Viewpoint | undefined }): Promise<void> {
+  async #start(engine: Engine, from: string | Blob, at: Opening): Promise<void> {
     try {
       if (!("VideoDecoder" in globalThis)) throw new Error(TEXTS.noWebCodecs);
       const source: Source | string =

@@ -10,25 +10,13 @@ import { finished } from "../synthesis/gl.ts";
 import { ViewRenderer, type Pixels } from "../synthesis/renderer.ts";
 import { drawShown, viewsShown } from "./drawing.ts";
 import { Immersive, type Due } from "./immersive.ts";
+import { measure, Originals } from "./originals.ts";
 import { Playback } from "./playback.ts";
-import type { Shown } from "./shown.ts";
+import { placed, type EngineEvents, type Opening, type Shown } from "./shown.ts";
 import { Standing } from "./standing.ts";
 import { Supply } from "./supply.ts";
 import { Tempo } from "./tempo.ts";
 import { Waiters } from "./waiters.ts";
-
-/** Told to whoever shows the controls. */
-export interface EngineEvents {
-  /** Another picture is on the screen. */
-  onFrame(): void;
-  /** Playback, loop or the file's length changed. */
-  onState(): void;
-  /** A picture has been waited for a while; false: it has come. */
-  onWaiting(isWaiting: boolean): void;
-  /** Something is wrong with the file; it goes on where `isFatal` is false. */
-  onTrouble(text: string, isFatal: boolean): void;
-}
-
 
 export class Engine {
   readonly shown: Shown = { frame: 0, view: { row: 0, col: 0 }, look: "picture", dolly: 0, eyes: { mode: "one", distance: 0.5 }, wipe: 0, focus: undefined };
@@ -41,6 +29,9 @@ export class Engine {
   #supply: Supply | undefined;
   #renderer: ViewRenderer | undefined;
   #immersive: Immersive | undefined;
+  #originals: Originals | undefined;
+  /** Luma PSNR of the picture that stands against its original, dB; undefined where they are not compared. */
+  psnr: number | undefined;
   /** The newest frame of a live view. */
   #liveFrame: number | undefined;
   #isDirty = false;
@@ -63,8 +54,8 @@ export class Engine {
     canvas.addEventListener("webglcontextrestored", () => this.#restore());
   }
 
-  /** Read a file, or follow the live view at an address, and show it from some seconds on; the view is the array's middle unless one is given. Throws Error. */
-  async open(source: Source | string, at: { seconds?: number; view?: Viewpoint | undefined } = {}): Promise<void> {
+  /** Read a file, or follow the live view at an address, and show it from some seconds on. Throws Error. */
+  async open(source: Source | string, at: Opening = {}): Promise<void> {
     const tell = (text: string) => this.#events.onTrouble(text, false);
     const onGrowth = () => this.#grown();
     const recording = typeof source === "string"
@@ -87,6 +78,8 @@ export class Engine {
     });
     const { header } = recording;
     this.#renderer = new ViewRenderer(this.#canvas, header);
+    const onCame = (trouble?: string) => (trouble === undefined ? undefined : tell(trouble), this.wake());
+    if (at.originals !== undefined) this.#originals = new Originals(at.originals, header, onCame);
     this.shown.frame = frameAt(recording.spans, at.seconds ?? 0);
     this.shown.view = clampView(header, at.view ?? { row: (header.rows - 1) / 2, col: (header.cols - 1) / 2 });
     this.playback.setEnd(timeOf(recording.spans, this.count - 1) + 1 / header.fps);
@@ -124,6 +117,15 @@ export class Engine {
 
   get traffic(): { requests: number; bytes: number } {
     return this.#source?.traffic ?? { requests: 0, bytes: 0 };
+  }
+
+  get hasOriginals(): boolean {
+    return this.#originals !== undefined;
+  }
+
+  /** The viewpoint that is shown. */
+  get view(): Viewpoint {
+    return placed(this.shown).view;
   }
 
   /** The frame that is on the screen. */
@@ -195,8 +197,8 @@ export class Engine {
   pixels(fine = true): Pixels {
     const frames = this.#supply?.decoded?.frames;
     if (this.#renderer === undefined || frames === undefined) throw new Error("no picture yet");
-    const { view, look, dolly } = this.shown;
-    const pixels = this.#renderer.read(frames, view, { look, fine, dolly });
+    const { look, dolly } = this.shown;
+    const pixels = this.#renderer.read(frames, this.view, { look, fine, dolly });
     if (this.#immersive === undefined) this.#draw(true); // the canvas may have lost what it showed
     return pixels;
   }
@@ -206,10 +208,10 @@ export class Engine {
     const frames = this.#supply?.decoded?.frames;
     if (this.#renderer === undefined || frames === undefined || this.shown.eyes.mode !== "one") return undefined;
     const { width, height } = this.header;
-    const { view, look, dolly } = this.shown;
+    const { look, dolly } = this.shown;
     const [column, row] = [Math.floor(x * width), Math.floor(y * height)];
     if (column < 0 || row < 0 || column >= width || row >= height) return undefined;
-    return this.#renderer.probe(frames, view, { look, dolly, fine: false }, column, row);
+    return this.#renderer.probe(frames, this.view, { look, dolly, fine: false }, column, row);
   }
 
   /** A small picture of a time, from the nearest camera and keyframe; undefined where it is damaged. */
@@ -255,13 +257,14 @@ export class Engine {
     if (this.#immersive !== undefined) return;
     this.#playOn(now);
     // While the next frame is decoded, the one that is there can be seen from elsewhere.
-    const isReady = (this.isOpen && this.#fetch(viewsShown(this.header, this.shown))) || this.#drawnView !== this.shown.view;
-    if (isReady && this.#isDirty && this.#supply?.decoded !== undefined) {
+    const isReady = (this.isOpen && this.#fetch(viewsShown(this.header, placed(this.shown)))) || this.#drawnView !== this.shown.view;
+    if (isReady && this.#compares() && this.#isDirty && this.#supply?.decoded !== undefined) {
       this.#isDirty = false;
       const isFinal = this.#isFinalDue || this.tempo.isQuick;
       this.#draw(isFinal);
+      this.psnr = isFinal ? measure(this.#renderer!, this.#supply.decoded.frames, this.view) : undefined;
       if (!isFinal) this.tempo.drawn(now);
-      else if (this.#isFinalDue) void this.#time();
+      else if (this.#isFinalDue) void this.#standing.time(finished(this.#renderer!.gl));
       this.#isFinalDue = false;
       this.#events.onFrame();
       this.#standing.moved();
@@ -302,19 +305,19 @@ export class Engine {
     this.wake();
   }
 
-  /** How long a picture takes that stands: those who move on at once should not wait for it again. */
-  async #time(): Promise<void> {
-    const since = performance.now();
-    await finished(this.#renderer!.gl);
-    this.#standing.took(performance.now() - since);
-  }
-
   #draw(isFinal: boolean): void {
     const frames = this.#supply?.decoded?.frames;
     if (this.#renderer === undefined || frames === undefined) return;
     this.#isFinal = isFinal;
     this.#drawnView = this.shown.view;
-    drawShown(this.#renderer, this.#canvas, this.header, frames, this.shown, isFinal ? 1 : this.tempo.detail, isFinal);
+    drawShown(this.#renderer, this.#canvas, this.header, frames, placed(this.shown), isFinal ? 1 : this.tempo.detail, isFinal);
+  }
+
+  /** Whether the original that is compared with is there, or there is none. */
+  #compares(): boolean {
+    const isDue = this.shown.look === "difference" && this.#originals !== undefined;
+    if (!isDue && this.#renderer !== undefined) this.#renderer.original = undefined;
+    return !isDue || this.#originals!.prepare(this.#renderer!, this.#supply?.decoded?.sequence, this.view);
   }
 
   /** Whether what some views need of the frame that is due is decoded; begins to decode it where it is not. */

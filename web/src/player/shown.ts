@@ -1,4 +1,4 @@
-/** What is asked of the player to show. */
+/** What is asked of the player to show, and what is told of it. */
 
 import type { Viewpoint } from "../geometry.ts";
 import type { Look } from "../synthesis/renderer.ts";
@@ -15,4 +15,31 @@ export interface Shown {
   wipe: number;
   /** Disparity that is in focus, px; undefined: everything is. */
   focus: number | undefined;
+}
+
+/** What is really shown: originals are of places of the array, so a view that is compared with one is the nearest of those. */
+export function placed(shown: Shown): Shown {
+  const { look, view } = shown;
+  return look === "difference" ? { ...shown, view: { row: Math.round(view.row), col: Math.round(view.col) } } : shown;
+}
+
+/** Where a file is shown first, and what it is compared with. */
+export interface Opening {
+  readonly seconds?: number;
+  /** The array's middle where absent. */
+  readonly view?: Viewpoint | undefined;
+  /** See `Originals`. */
+  readonly originals?: string | undefined;
+}
+
+/** Told to whoever shows the controls. */
+export interface EngineEvents {
+  /** Another picture is on the screen. */
+  onFrame(): void;
+  /** Playback, loop or the file's length changed. */
+  onState(): void;
+  /** A picture has been waited for a while; false: it has come. */
+  onWaiting(isWaiting: boolean): void;
+  /** Something is wrong with the file; it goes on where `isFatal` is false. */
+  onTrouble(text: string, isFatal: boolean): void;
 }

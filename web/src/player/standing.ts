@@ -40,6 +40,13 @@ export class Standing {
     this.#costMs = ms;
   }
 
+  /** A picture in all detail has been begun: those who move on at once should not wait for it again. */
+  async time(drawn: Promise<void>): Promise<void> {
+    const since = performance.now();
+    await drawn;
+    this.took(performance.now() - since);
+  }
+
   close(): void {
     clearTimeout(this.#timer);
   }

@@ -21,8 +21,10 @@ export interface SupplyEvents {
   onTrouble(text: string, isFatal: boolean): void;
 }
 
-interface Decoded {
+export interface Decoded {
   readonly frame: number;
+  /** Its number in the encoder's input, where it has one. */
+  readonly sequence: number | undefined;
   readonly frames: readonly CameraFrame[];
   /** The cameras that were asked for. */
   readonly asked: string;
@@ -58,7 +60,7 @@ export class Supply {
   }
 
   /** What there is to be drawn; undefined before the first frame. */
-  get decoded(): { readonly frame: number; readonly frames: readonly CameraFrame[] } | undefined {
+  get decoded(): Decoded | undefined {
     return this.#decoded;
   }
 
@@ -89,8 +91,9 @@ export class Supply {
     try {
       const isWanted = () => events.isPlaying() || events.isWanted(frame);
       const frames = await this.#store.get(frame, cameras, isWanted);
+      const sequence = await this.#store.sequence(frame);
       this.decodeMs = performance.now() - since;
-      if (frames.length > 0 && !this.#isClosed) this.#decoded = { frame, frames, asked };
+      if (frames.length > 0 && !this.#isClosed) this.#decoded = { frame, sequence, frames, asked };
       else if (frames.length === 0 && isWanted()) this.#skip(frame, asked);
       if (events.isPlaying()) this.#prefetch(frame, cameras);
     } catch (error) {
@@ -107,7 +110,7 @@ export class Supply {
   /** No camera has this frame: the last picture stays, as if it were this one. */
   #skip(frame: number, asked: string): void {
     if (this.#decoded === undefined && frame + 1 < frameCount(this.#recording)) this.#events.onMissing(frame);
-    else this.#decoded = { frame, frames: this.#decoded?.frames ?? [], asked };
+    else this.#decoded = { frame, sequence: undefined, frames: this.#decoded?.frames ?? [], asked };
   }
 
   #prefetch(frame: number, cameras: readonly Camera[]): void {

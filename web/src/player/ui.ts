@@ -8,6 +8,7 @@ import { EYE_MODES } from "./drawing.ts";
 import type { Engine } from "./engine.ts";
 import { Gestures } from "./gestures.ts";
 import { hasHeadset } from "./immersive.ts";
+import { Incoming } from "./incoming.ts";
 import { isForControl, keyActions, keyList } from "./keys.ts";
 import { Looking } from "./looking.ts";
 import { Probe } from "./probe.ts";
@@ -24,7 +25,6 @@ const PEEK_PX = 160;
 export class Ui {
   readonly #host: HTMLElement;
   readonly #canvas: HTMLCanvasElement;
-  readonly #open: (from: Blob) => void;
   readonly #stage = element("div", { class: "stage", tabindex: "0", role: "application", "aria-label": TEXTS.stage });
   readonly #wait = element("p", { class: "wait", role: "status", hidden: true });
   readonly #big = button(TEXTS.play, icon("play"), () => this.togglePlay());
@@ -34,7 +34,8 @@ export class Ui {
   readonly #probe = new Probe();
   readonly #spoken = element("p", { class: "unseen", role: "status" });
   readonly #dialog = keyList();
-  readonly #file = element("input", { type: "file", accept: ".mcap", hidden: true });
+  readonly #incoming: Incoming;
+  readonly #psnr = element("p", { class: "psnr", role: "status", hidden: true });
   readonly #poster = element("img", { class: "poster", alt: "", hidden: true });
   readonly controls: Controls;
   readonly #keys: ReadonlyMap<string, () => void>;
@@ -50,7 +51,7 @@ export class Ui {
   constructor(host: HTMLElement, root: ShadowRoot, canvas: HTMLCanvasElement, open: (from: Blob) => void) {
     this.#host = host;
     this.#canvas = canvas;
-    this.#open = open;
+    this.#incoming = new Incoming(open);
     this.controls = new Controls(this.#actions());
     this.#keys = keyActions(this);
     this.#big.classList.add("big", "fills");
@@ -58,7 +59,7 @@ export class Ui {
     this.#stage.append(canvas, this.#poster);
     const middle = element("div", { class: "middle" }, this.#wait, this.#big);
     root.append(this.#stage, middle, this.#hint, this.#stats, this.#probe.label, this.controls.bar, this.controls.menu,
-      this.#notice, this.#spoken, this.#dialog, this.#file);
+      this.#notice, this.#psnr, this.#spoken, this.#dialog, this.#incoming.input);
   }
 
   connect(): void {
@@ -78,16 +79,7 @@ export class Ui {
     const keyboard: EventTarget = this.#host.hasAttribute("page") ? document : this.#host;
     keyboard.addEventListener("keydown", (event) => this.#key(event as KeyboardEvent), { signal });
     for (const name of ["pointermove", "focusin"]) this.#host.addEventListener(name, () => this.#awake(), { signal });
-    this.#host.addEventListener("dragover", (event) => event.preventDefault(), { signal });
-    this.#host.addEventListener("drop", (event) => {
-      event.preventDefault();
-      const [file] = event.dataTransfer?.files ?? [];
-      if (file !== undefined) this.#open(file);
-    }, { signal });
-    this.#file.addEventListener("change", () => {
-      const [file] = this.#file.files ?? [];
-      if (file !== undefined) this.#open(file);
-    }, { signal });
+    this.#incoming.listen(this.#host, signal);
     const lookForHeadset = () => void hasHeadset().then((isThere) => this.controls.offerHeadset(isThere));
     navigator.xr?.addEventListener("devicechange", lookForHeadset, { signal });
     lookForHeadset();
@@ -114,6 +106,7 @@ export class Ui {
   opened(isViewGiven: boolean): void {
     const engine = this.#engine!;
     this.controls.setRange(engine.header.range);
+    this.controls.offerOriginals(engine.hasOriginals);
     this.#big.hidden = engine.count < 2 || this.#host.hasAttribute("autoplay");
     if (engine.header.predicted.length > 0) this.tell(TEXTS.predicted(engine.header.predicted.length));
     else if (engine.header.mapCameras === "none") this.tell(TEXTS.noMaps);
@@ -153,6 +146,8 @@ export class Ui {
       section: playback.section,
       isGrowing: engine.isGrowing,
     });
+    this.#psnr.hidden = engine.psnr === undefined;
+    if (engine.psnr !== undefined) this.#psnr.textContent = TEXTS.psnr(engine.psnr);
     if (!this.#stats.hidden) this.#stats.textContent = statistics(engine);
   }
 
@@ -224,7 +219,8 @@ export class Ui {
   nextLook(): void {
     const engine = this.#engine;
     if (!engine?.isOpen) return;
-    const look = LOOKS[(LOOKS.indexOf(engine.shown.look) + 1) % LOOKS.length];
+    const looks = LOOKS.filter((name) => name !== "difference" || engine.hasOriginals);
+    const look = looks[(looks.indexOf(engine.shown.look) + 1) % looks.length];
     void engine.change({ look });
     this.#spoken.textContent = TEXTS.looks[look];
     this.update();
@@ -260,7 +256,7 @@ export class Ui {
   }
 
   openFile(): void {
-    this.#file.click();
+    this.#incoming.input.click();
   }
 
   savePicture(): void {

@@ -128,6 +128,12 @@ export class Texture implements Bindable {
     clampAndFilter(gl, gl.TEXTURE_2D);
   }
 
+  upload(pixels: ImageData): void {
+    const gl = this.#gl;
+    gl.bindTexture(gl.TEXTURE_2D, this.texture);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  }
+
   bind(unit: number): void {
     this.#gl.activeTexture(this.#gl.TEXTURE0 + unit);
     this.#gl.bindTexture(this.#gl.TEXTURE_2D, this.texture);

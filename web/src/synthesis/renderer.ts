@@ -12,7 +12,7 @@ import searchShader from "./search.glsl";
 import viewFragment from "./view.frag.glsl";
 
 /** What a view shows, in the order of `view.frag.glsl`. */
-export const LOOKS = ["picture", "disparity", "layers", "provenance", "disagreement"] as const;
+export const LOOKS = ["picture", "disparity", "layers", "provenance", "disagreement", "difference"] as const;
 export type Look = (typeof LOOKS)[number];
 const RAW = LOOKS.length;
 
@@ -64,6 +64,10 @@ export interface Area {
 
 export class ViewRenderer {
   readonly gl: WebGL2RenderingContext;
+  /** What the look `difference` compares with, of the picture's size; without one it shows the picture. */
+  original: ImageData | undefined;
+  #uploaded: ImageData | undefined;
+  readonly #originalTexture: Texture;
   readonly #header: Header;
   readonly #cameras: CameraTextures;
   readonly #fineBounds: Bounds;
@@ -87,6 +91,7 @@ export class ViewRenderer {
     const { width, height } = this.#cameras.chroma;
     this.#surface = new Texture(this.gl, 4, width, height);
     this.#geometryTarget = framebufferOf(this.gl, this.#surface);
+    this.#originalTexture = new Texture(this.gl, 4, header.width, header.height);
     this.#geometry = makeProgram(this.gl, fullVertex, searchShader + geometryFragment);
     this.#draft = makeProgram(this.gl, fullVertex, draftFragment);
   }
@@ -184,14 +189,17 @@ export class ViewRenderer {
   #drawView(seen: Seen, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
     const { gl } = this;
     const view = this.#view;
+    const look = settings.look === "difference" && this.original === undefined ? "picture" : settings.look;
+    if (look === "difference" && this.#uploaded !== this.original) this.#originalTexture.upload(this.original!);
+    if (look === "difference") this.#uploaded = this.original;
     view.use();
-    view.textures({ uCameras: this.#cameras.pixels, uNear: this.#fineBounds.near, uFar: this.#fineBounds.far });
+    view.textures({ uCameras: this.#cameras.pixels, uNear: this.#fineBounds.near, uFar: this.#fineBounds.far, uOriginal: this.#originalTexture });
     this.#describe(view, seen, 1, 0);
     gl.uniform1f(view.at("uTile"), FINE_BLOCK);
     gl.uniform1i(view.at("uTwoSuffice"), 0);
     gl.uniform2i(view.at("uSize"), this.#header.width, this.#header.height);
     gl.uniform1f(view.at("uWipe"), settings.wipe ?? 0);
-    gl.uniform1i(view.at("uLook"), settings.raw ? RAW : LOOKS.indexOf(settings.look));
+    gl.uniform1i(view.at("uLook"), settings.raw ? RAW : LOOKS.indexOf(look));
     gl.uniform1i(view.at("uFine"), settings.fine ? 1 : 0);
     gl.uniform1i(view.at("uSoftens"), seen.weights.filter((weight) => weight > 0).length > 1 ? 1 : 0);
     this.#drawArea(view, settings, area, target);

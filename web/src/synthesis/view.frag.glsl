@@ -2,6 +2,7 @@
 // Goes behind search.glsl. What few pixels need stands in loops of one turn: GPUs in software jump over those alone.
 
 uniform sampler2DArray uCameras; // Y, Cb, Cr, code value
+uniform sampler2D uOriginal;     // what a camera really saw from there
 uniform vec4 uArea;              // x, y, width, height of what is drawn
 uniform bool uFromTop;           // the first row drawn is the picture's first
 uniform vec2 uOffset;            // px that the picture is moved by
@@ -18,11 +19,14 @@ const float STRAY = 0.1;         // how much a pixel counts that none of its nei
 const int FILL_REACH = 24;       // px that a gap is looked over for its ends
 const int PAINT_REACH = 32;      // px that holes are painted from
 
+const float DIFFERENCE_GAIN = 4.0;
+
 const int DISPARITY = 1;
 const int LAYERS = 2;
 const int PROVENANCE = 3;
 const int DISAGREEMENT = 4;
-const int RAW = 5;              // disparity in 16 bits, for programs
+const int DIFFERENCE = 5;
+const int RAW = 6;              // disparity in 16 bits, for programs
 
 float codeAt(int camera, ivec2 pixel) {
     return texelFetch(uCameras, ivec3(pixel, uLayer[camera]), 0).a;
@@ -209,6 +213,10 @@ void main() {
         colour = mix(vec3(colour.g), by, 0.7);
     }
     if (look == DISAGREEMENT) colour = ramp(min(sqrt(max(squares - sum.r * sum.r, 0.0)) * 12.0, 1.0));
+    if (look == DIFFERENCE) {
+        vec3 away = abs(colour - texelFetch(uOriginal, ivec2(clamp(at + 0.5, vec2(0.0), vec2(uSize) - 0.5)), 0).rgb);
+        colour = ramp(min(max(max(away.r, away.g), away.b) * DIFFERENCE_GAIN, 1.0));
+    }
     if (look == RAW) colour = vec3(floor(t * 255.0) / 255.0, fract(t * 255.0), seen == 0 ? 1.0 : 0.0);
     oColour = vec4(colour, 1.0);
 }
