@@ -69,6 +69,8 @@ class FoxgloveClient:
 @contextmanager
 def foxglove(url: str) -> Iterator[FoxgloveClient]:
     """A connected client."""
-    # It takes little in advance, so that a test can let the server's queue run full.
-    with connect(url, subprotocols=["foxglove.sdk.v1"], max_queue=1) as connection:  # type: ignore[list-item]
+    # It takes little in advance, so that a test can let the server's queue run full. What then was not read
+    # hides that the server has gone, which is waited for at the end.
+    protocols: Any = ["foxglove.sdk.v1"]
+    with connect(url, subprotocols=protocols, max_queue=1, close_timeout=0.2) as connection:
         yield FoxgloveClient(connection)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -9,6 +10,8 @@ from pathlib import Path
 
 import pytest
 from packages import build_wheel, installed
+
+from mvcodec.kernels.compiled_code import folder
 
 ROOT = Path(__file__).parents[1]
 
@@ -45,17 +48,22 @@ WRONG = "import mvcodec\nwith mvcodec.open('x.mcap') as video:\n    video.render
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Built from a copy, since building leaves files beside the sources."""
-    folder = tmp_path_factory.mktemp("wheel")
-    copy = folder / "source"
+    place = tmp_path_factory.mktemp("wheel")
+    copy = place / "source"
     copy.mkdir()
     for name in ("pyproject.toml", "README.md", "LICENSE", "mvcodec"):
         subprocess.run(["cp", "-r", str(ROOT / name), str(copy)], check=True)
-    return build_wheel(copy, folder)
+    return build_wheel(copy, place)
 
 
 @pytest.fixture(scope="module")
 def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    return installed(tmp_path_factory.mktemp("installed") / "site", wheel)
+    """The wheel is installed, and has the kernels that were compiled before, as long as they are the same."""
+    site = tmp_path_factory.mktemp("installed") / "site"
+    found = installed(site, wheel)
+    for kept in folder().glob("*.nb[ci]"):
+        shutil.copy(kept, site / "mvcodec" / "kernels" / "__pycache__")
+    return found
 
 
 def test_page_and_type_marker_are_in_the_wheel(wheel: Path) -> None:
