@@ -180,7 +180,10 @@ def _coded_db(source: SceneSource | RectifiedSource, truths: Mapping[Viewpoint, 
 
 
 def _registered_db(truth: Picture, view: Picture) -> float:
-    """Luma PSNR once the best homography (Evangelidis and Psarakis 2008) and gain are taken out."""
+    """Luma PSNR once the best homography (Evangelidis and Psarakis 2008) and gain are taken out.
+
+    The view is brought to the truth's brightness: errors of brighter pictures would count more.
+    """
     one, other = (cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY) for picture in (view, truth))
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-7)
     start = np.eye(3, dtype=np.float32)
@@ -190,8 +193,8 @@ def _registered_db(truth: Picture, view: Picture) -> float:
     moved = cv2.warpPerspective(truth, warp, size, flags=flags, borderMode=cv2.BORDER_REFLECT)
     inside = cv2.warpPerspective(np.full_like(other, 255), warp, size, flags=cv2.WARP_INVERSE_MAP) == 255
     gain = float((moved.astype(float) * view).sum() / (moved.astype(float) ** 2).sum())
-    lit = np.clip(np.rint(moved * gain), 0, 255).astype(np.uint8)
-    return psnr(np.where(inside[..., None], lit, view), view)
+    lit = np.clip(np.rint(view / gain), 0, 255).astype(np.uint8)
+    return psnr(np.where(inside[..., None], moved, lit), lit)
 
 
 def true_rectified_camera(rig: Rig, scene: RoughScene) -> tuple[Optics, Vectors]:

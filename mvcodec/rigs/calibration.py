@@ -17,6 +17,7 @@ from mvcodec.rigs.board import Sightings
 from mvcodec.rigs.calibration_files import KnownCamera, read_cameras
 from mvcodec.rigs.colour_match import matched_colours
 from mvcodec.rigs.features import PairCount, Tracks, find_tracks
+from mvcodec.rigs.finer import finer
 from mvcodec.rigs.framing import Crop
 from mvcodec.rigs.from_board import LensChoice, cameras_from_board
 from mvcodec.rigs.from_scene import FEWEST_POINTS, check_shared, rig_from_adjusted
@@ -93,7 +94,7 @@ def calibrate_from_scene(source: ArraySource, chosen: range, wishes: Wishes | No
     check_shared(every, source.name)
     grid = np.array([(col, row * array.rho) for row, col in array.positions], np.float64)
     size = array.width, array.height
-    adjusted = adjust(every, grid, size, array.calibration.fx_px)
+    adjusted = adjust(finer(every, frame_sets), grid, size, array.calibration.fx_px)
     rig = rig_from_adjusted(array, adjusted, wishes.crop, wishes.size)
     return _finished(rig, frame_sets, every, adjusted.tracks, pairs)
 
