@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -198,7 +199,10 @@ def test_info_states_how_a_file_was_made_and_how_long_it_plays(coded: Path) -> N
     assert info["duration_s"] == pytest.approx(FRAMES / 10)
     assert info["megabytes"] == coded.stat().st_size / 1e6
     assert info["mbit_per_s"] == pytest.approx(8 * info["megabytes"] / info["duration_s"])
+    os.utime(coded, (0, 86_399))
+    assert json.loads(succeeds("info", coded, "--json"))["created"] == "1970-01-01T23:59:59Z"
     text = succeeds("info", coded)
+    assert "created      1970-01-01 23:59:59 UTC, as the system dates the file" in text
     for part in ("h264, QP 22", "joint", f"mvcodec {__version__}", "0.40 s", "Mbit/s"):
         assert part in text
 

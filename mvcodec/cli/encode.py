@@ -118,7 +118,9 @@ def run(arguments: argparse.Namespace) -> None:
         return
     info = read_info(arguments.output)
     if arguments.json:
-        print(json.dumps(document(info) | {"simulcast_bits_estimated": simulcast_bits(info)}))
+        print(
+            json.dumps(document(info, arguments.output) | {"simulcast_bits_estimated": simulcast_bits(info)})
+        )
     elif not arguments.quiet:
         print(f"{arguments.output}: {summary(info)}{_beside_simulcast(info)}")
 

@@ -8,9 +8,11 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 from mvcodec.container import StreamInfo, read_info
+from mvcodec.container.remote import is_url
 from mvcodec.decoding.estimated_maps import DEFAULT_MATCHER
 from mvcodec.errors import MvCodecWarning, StreamError
 from mvcodec.stream import StreamHeader, TrackKind
@@ -32,7 +34,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Print what the file holds."""
     info = read_info(arguments.input, _warn)
     if arguments.json:
-        print(json.dumps(document(info)))
+        print(json.dumps(document(info, arguments.input)))
         return
     array, (low, high) = info.header.array, info.header.disparity_range_px
     rows, cols = (",".join(map(str, axis)) for axis in (array.real_rows, array.real_cols))
@@ -43,6 +45,7 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"  codec        {info.header.codec}, {_rate(info.header.settings)}")
     print(f"  matcher      {info.header.settings.get('matcher', 'not stated')}")
     print(f"  made by      {info.header.settings.get('encoder', 'not stated')}{_recorded(info)}")
+    print(f"  created      {_creation(arguments.input)}")
     if info.header.predicted:
         tracks = [info.header.picture_track(camera) for camera in array.real]
         alone = [track.topic for track in tracks if track.kind is TrackKind.TEXTURE]
@@ -73,11 +76,24 @@ def _rate(settings: Mapping[str, Any]) -> str:
     return "rate not stated"
 
 
-def _recorded(info: StreamInfo) -> str:
-    """When the pictures were taken, where their times are of a clock and don't count from 0.
+def _dated(source: str | Path) -> datetime | None:
+    """When a file was written, as the system dates it; None of one behind a URL.
 
-    The header has no date of its own, so that the same input gives the same file.
+    It holds no date of its own, so that the same input gives the same file.
     """
+    text = str(source)
+    return None if is_url(text) else datetime.fromtimestamp(Path(text).stat().st_mtime, UTC)
+
+
+def _creation(source: str) -> str:
+    date = _dated(source)
+    if date is None:
+        return "not known of a file behind a URL"
+    return f"{date:%Y-%m-%d %H:%M:%S} UTC, as the system dates the file"
+
+
+def _recorded(info: StreamInfo) -> str:
+    """When the pictures were taken, where their times are of a clock and don't count from 0."""
     first_s = info.span_ns[0] / 1e9
     if first_s < FIRST_DATED_S:
         return ", times without a date"
@@ -106,9 +122,9 @@ def _layer(info: StreamInfo) -> str:
     return f"{views} coded from their synthesis{quality}; the base plays without"
 
 
-def document(info: StreamInfo) -> dict[str, Any]:
-    """What ``info --json`` prints."""
-    array = info.header.array
+def document(info: StreamInfo, source: str | Path) -> dict[str, Any]:
+    """What ``info --json`` prints of a file."""
+    array, date = info.header.array, _dated(source)
     return {
         "grid": [array.rows, array.cols],
         "real": [list(position) for position in array.real],
@@ -133,6 +149,7 @@ def document(info: StreamInfo) -> dict[str, Any]:
         "rate": {name: info.header.settings[name] for name in RATES if name in info.header.settings},
         "matcher": info.header.settings.get("matcher"),
         "encoder": info.header.settings.get("encoder"),
+        "created": None if date is None else f"{date:%Y-%m-%dT%H:%M:%SZ}",
         "first_s": info.span_ns[0] / 1e9,
         "duration_s": info.duration_s,
         "megabytes": info.bits.total / 8e6,

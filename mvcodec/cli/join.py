@@ -38,6 +38,6 @@ def run(arguments: argparse.Namespace) -> None:
         join(arguments.input, part, limits_of(arguments))
     info = read_info(arguments.output)
     if arguments.json:
-        print(json.dumps(document(info)))
+        print(json.dumps(document(info, arguments.output)))
     elif not arguments.quiet:
         print(f"{arguments.output}: {summary(info)}")
