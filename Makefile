@@ -20,6 +20,9 @@ OUT ?= demo
 DATA ?= ../shared/data
 SECONDS ?= 120
 
+# Hundreds of short commands run in the tests: Python compiles for all of them once, whatever the environment says.
+unexport PYTHONDONTWRITEBYTECODE
+
 NEEDS_PYTHON = $(if $(PYTHON),,$(error mvcodec needs Python 3.11 or newer; none found on PATH))
 NEEDS_VENV = $(if $(shell $(PYTHON) -c 'import sys, venv, ensurepip; print(sys.version_info >= (3, 11) or "")' 2>/dev/null),,\
 	$(error mvcodec needs Python 3.11 or newer with the venv module (Debian, Ubuntu: apt install python3-venv); $(PYTHON) is not))
@@ -35,7 +38,7 @@ demo: $(STAMP)
 
 test: lint
 	cd web && $(NODE_ENV) node build.mjs --tests && $(NODE_ENV) node --test ../build/web-tests/*.test.mjs
-	$(BIN)/pytest -n 2 --dist loadfile -m "not slow"
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 test-slow: $(STAMP)
 	$(BIN)/pytest -m slow
