@@ -42,7 +42,7 @@ def open_files(
 
     def opened(path: Path) -> ViewReader:
         is_picture = path.suffix.lower() in PICTURE_SUFFIXES
-        return PictureView((path,), depth) if is_picture else VideoView(path)
+        return PictureView((path,), depth) if is_picture else VideoView(path, reading.gaps)
 
     readers = run_all(opened, paths)
     cols = whole[1] // inside[1]

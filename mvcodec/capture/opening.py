@@ -14,6 +14,7 @@ from mvcodec.capture.reading import Reading
 from mvcodec.capture.selection import CORNERS, RealAxes, select_real
 from mvcodec.capture.shared_clock import StatedTimes, common_times
 from mvcodec.capture.source import ArraySource
+from mvcodec.capture.time_gaps import Gaps
 from mvcodec.capture.timing import Timing
 from mvcodec.capture.video_input import VideoView
 from mvcodec.capture.view_array import PictureView, ViewArray, ViewReader, check_sizes
@@ -81,7 +82,7 @@ def _open_folder(
     if manifest.given is not None and manifest.given.kind == "depth" and manifest.calibration is None:
         raise InputError(manifest.path, "depth without calibration", "calibration, which makes it disparity")
     depth = BitDepth(str(path), reading.bits)
-    views = _open_views(manifest, depth)
+    views = _open_views(manifest, depth, reading.gaps)
     stated = StatedTimes(manifest.path, manifest.fps, manifest.times_ns, manifest.first_frame)
     axes = select_real(real, manifest.rows, manifest.cols)
     deciding = views if originals else _crossings(axes)
@@ -168,9 +169,9 @@ def _open_videos(
     return ViewArray(name, array, views, pairing, on_unreadable=reading.on_unreadable)
 
 
-def _open_views(manifest: Manifest, depth: BitDepth) -> dict[Position, ViewReader]:
+def _open_views(manifest: Manifest, depth: BitDepth, gaps: Gaps | None) -> dict[Position, ViewReader]:
     def opened(files: ViewFiles) -> ViewReader:
-        return VideoView(files) if isinstance(files, Path) else PictureView(files, depth)
+        return VideoView(files, gaps) if isinstance(files, Path) else PictureView(files, depth)
 
     views = dict(zip(manifest.views, run_all(opened, manifest.views.values()), strict=True))
     check_sizes(views)

@@ -8,6 +8,7 @@ from typing import Any
 
 from mvcodec.array import MAX_GRID_SIDE
 from mvcodec.capture.bit_depth import LEAST_BITS, MOST_BITS
+from mvcodec.capture.time_gaps import Gaps, gaps_field
 from mvcodec.errors import InputError
 from mvcodec.settings import check_settings, setting
 
@@ -41,7 +42,8 @@ class Reading:
     """Settings of every kind of input.
 
     Attributes:
-        bits, split: explained by their fields; see `BitDepth`. No `split`: one view, or those of a quilt.
+        bits, split, gaps: explained by their fields; see `BitDepth`, `behind_gaps`. No `split`: one view,
+            or those of a quilt.
         on_unreadable: told of a picture that cannot be read, whose frame set is left out; None: it is
             raised.
 
@@ -52,6 +54,7 @@ class Reading:
     bits: int | None = used_bits()
     on_unreadable: OnUnreadable | None = None
     split: tuple[int, int] | None = views_in_pictures()
+    gaps: Gaps | None = gaps_field()
 
     def __post_init__(self) -> None:
         check_settings(self)

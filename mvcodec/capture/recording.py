@@ -97,6 +97,7 @@ class Recording:
                 StillDecoder(name, self._depth) if position[0] < rows else DepthDecoder(name),
                 self._reader.indexed,
                 self._tell,
+                settings.gaps,
             )
             for topic, position in self._topics.items()
         }

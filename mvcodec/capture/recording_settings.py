@@ -10,6 +10,7 @@ from typing import get_args
 from mvcodec.array import Calibration, Position
 from mvcodec.capture.reading import used_bits, views_in_pictures
 from mvcodec.capture.selection import real_cameras, select_real
+from mvcodec.capture.time_gaps import Gaps, gaps_field
 from mvcodec.capture.timing import nominal_fps, tolerance
 from mvcodec.container.recorded_pictures import Clock
 from mvcodec.errors import SettingError
@@ -26,7 +27,7 @@ class RecordingSettings:
         topics: of every view of the grid, or of every `split` views, row by row.
         calibration: of all cameras; None: the recording's own, or nominal.
         offsets_ms: what is added to a topic's times.
-        real, fps, tolerance_ms, clock, bits, split: explained by their fields.
+        real, fps, tolerance_ms, clock, bits, split, gaps: explained by their fields.
         depth_topics: of the depth of every view, rows as `topics` has them; None: there is none.
 
     Raises:
@@ -47,6 +48,7 @@ class RecordingSettings:
     bits: int | None = used_bits()
     depth_topics: TopicGrid | None = None
     split: tuple[int, int] = views_in_pictures((1, 1))
+    gaps: Gaps | None = gaps_field()
 
     def __post_init__(self) -> None:
         widths = {len(row) for row in self.topics}

@@ -13,6 +13,7 @@ from mvcodec.capture.message_clock import SET_BACK_NS, MessageClock
 from mvcodec.capture.picture_messages import StillDecoder
 from mvcodec.capture.recorded_maps import DepthDecoder, Depths
 from mvcodec.capture.stamp_check import Judged, StampCheck
+from mvcodec.capture.time_gaps import Gaps
 from mvcodec.capture.video_input import frame_to_rgb
 from mvcodec.capture.video_messages import LeftOut, ShownPicture, VideoDecoder
 from mvcodec.container.recorded_pictures import RecordedPicture
@@ -52,6 +53,7 @@ class TopicPictures:
         stills: decodes its still pictures, or its depth.
         settled: the recording can be looked ahead in: still pictures are put in order of their stamps.
         leave_out: told of messages whose picture is left out, and why.
+        gaps: what gaps in time are where the codec does not tell; None: lost pictures where they are rare.
     """
 
     def __init__(
@@ -62,10 +64,11 @@ class TopicPictures:
         stills: StillDecoder | DepthDecoder,
         settled: bool,
         leave_out: Callable[[RecordedPicture, str], None],
+        gaps: Gaps | None = None,
     ) -> None:
         self._clock, self._offset_ns, self._leave_out = clock, offset_ns, leave_out
         self._ahead = REORDERED if settled else 0
-        self._video, self.stills = VideoDecoder(name), stills
+        self._video, self.stills = VideoDecoder(name, gaps), stills
         self._reformatter = VideoReformatter()
         self._early: list[tuple[int, int, RecordedPicture]] = []
         self._count = 0

@@ -21,6 +21,7 @@ from av.video.stream import VideoStream
 from mvcodec.capture.orientation import UPRIGHT, Orientation, matrix_orientation
 from mvcodec.capture.picture_files import wrong_size
 from mvcodec.capture.reading import OnUnreadable
+from mvcodec.capture.time_gaps import Gaps
 from mvcodec.capture.video_times import VideoTimes, read_times, with_data
 from mvcodec.errors import InputError
 from mvcodec.frames import Picture
@@ -50,6 +51,10 @@ _HDR = {16: "PQ", 18: "HLG"}
 class VideoView:
     """The frames of one view in a video file. Opened anew for each pass over it.
 
+    Args:
+        path: the file.
+        gaps: what gaps in time are where the codec does not tell, see `behind_gaps`.
+
     Attributes:
         path: the file.
         size: (width, height) as shown, px.
@@ -63,11 +68,11 @@ class VideoView:
         InputError: missing, unreadable, or without a video stream or any frame.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, gaps: Gaps | None = None) -> None:
         self.path = path
         try:
             with _opened(path) as container:
-                times = read_times(container, _video_stream(container, path))
+                times = read_times(container, _video_stream(container, path), gaps)
             with _opened(path) as container:
                 stream = _video_stream(container, path)
                 first = next(container.decode(stream), None) if times.stamps else None
@@ -85,10 +90,16 @@ class VideoView:
         self.size = self._orientation.size(*self._coded_size)
         self.notes += notes + unusual(first)
         self.notes += tuple(f"{count} pictures are left out: {why}" for why, count in times.left_out.items())
-        if times.unsure:
+        if times.set_back:
             self.notes += (
-                f"{times.unsure} gaps in time: video of its codec does not say whether pictures are missing"
-                " there that later ones build on",
+                f"its clock was set back {len(times.set_back)} times, by up to {max(times.set_back):.3f} s:"
+                " times go on from there",
+            )
+        if times.pauses and gaps is None:
+            self.notes += (
+                f"{times.pauses} gaps in time are taken for those of a variable rate: video of its codec does"
+                " not say whether pictures are missing there that later ones build on; if so, `gaps` lost"
+                " leaves these out",
             )
         if times.cut_off:
             self.notes += (f"it breaks off after {self.count} pictures ({times.cut_off})",)

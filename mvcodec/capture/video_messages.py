@@ -15,6 +15,7 @@ from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from mvcodec.capture.picture_messages import MAX_PIXELS
+from mvcodec.capture.time_gaps import BEHIND_GAP, Gaps, GapWatch
 from mvcodec.capture.video_input import unusual
 from mvcodec.capture.whole_pictures import WholePictures
 from mvcodec.container.recorded_pictures import RecordedPicture
@@ -24,6 +25,12 @@ _CODECS = {"h264": "h264", "h265": "hevc", "hevc": "hevc", "vp9": "vp9", "av1": 
 """A message's word for a codec -> ours."""
 
 _LIBRARIES = {"h264": "h264", "hevc": "hevc", "vp9": "vp9", "av1": "libdav1d"}
+
+_MAY_REPEAT = ("vp9", "av1")
+"""Codecs in which pictures of what stands still may be the same bytes."""
+
+_UNNUMBERED = ("vp9",)
+"""Codecs whose pictures don't tell whether one before them is missing."""
 
 _NAL_CODECS, _START_CODE = ("h264", "hevc"), b"\0\0\1"
 
@@ -47,16 +54,17 @@ class VideoDecoder:
 
     Args:
         name: of the recording, for messages.
+        gaps: what gaps in time are where the codec does not tell; None: lost pictures where they are rare.
     """
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, name: str, gaps: Gaps | None = None) -> None:
+        self._name, self._gaps, self._gap_watch = name, gaps, GapWatch(gaps)
         self._codec = ""
         self._whole = WholePictures("")
         self._context: VideoCodecContext | None = None
         self._sent: dict[int, RecordedPicture] = {}
         self._count = 0
-        self._recent: deque[bytes] = deque(maxlen=_RECENT)
+        self._recent: deque[tuple[bytes, int]] = deque(maxlen=_RECENT)
         self._head = b""
         self._lost = self._left_out = False
         self._told: set[str] = set()
@@ -72,11 +80,15 @@ class VideoDecoder:
         if codec is None:
             found = f"video of format {message.format!r}, which is not supported"
             raise self._error(message, found, ", ".join(_CODECS))
-        if message.data in self._recent:
+        key = message.data, message.stamp_ns if codec in _MAY_REPEAT else 0
+        if key in self._recent:
             raise LeftOut("it is a duplicate")
-        self._recent.append(message.data)
+        self._recent.append(key)
         if codec != self._codec:
             self._codec, self._whole, self._context = codec, WholePictures(codec), None
+            self._gap_watch = GapWatch(self._gaps)
+        if codec in _UNNUMBERED and self._gap_watch.push(message.time_ns):
+            self.lose(BEHIND_GAP)
         data = self._head + message.data
         why, unit = self._whole.push(data, message.time_ns)
         if unit is not None and not unit.pictures:

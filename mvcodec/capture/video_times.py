@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 
 from av.bitstream import BitStreamFilterContext
 from av.container import InputContainer
@@ -15,6 +16,7 @@ from av.packet import Packet
 from av.video.stream import VideoStream
 
 from mvcodec.capture.pairing import typical_step_ns
+from mvcodec.capture.time_gaps import BEHIND_GAP, Gaps, TimedPacket, behind_gaps
 from mvcodec.capture.timing import on_grid, rate_of_times, steady_rate
 from mvcodec.capture.whole_pictures import BUILDS_ON_LOSS, NOT_STARTED, WholePictures
 
@@ -32,10 +34,15 @@ _UNKNOWN_TIME = "how many pictures are missing before them is unknown, since the
 
 _MS = 1_000_000
 
-_TELL_LOSSES = ("h264", "hevc", "av1")
+_SET_BACK_S = Fraction(1, 4)
+"""A time of decoding that is earlier than the one before by more is a clock that was set, as where files
+were joined."""
+
+_TELL_LOSSES = frozenset({"h264", "hevc", "av1"})
 """Codecs whose pictures say when what they build on is missing."""
 
-_GAP_STEPS = 1.5
+_STATE_DURATIONS = frozenset({"gif", "apng", "webp"})
+"""Codecs of animations, each of whose pictures says how long it stands: none is missing."""
 
 _PLAIN = {"h264": "h264_mp4toannexb", "hevc": "hevc_mp4toannexb", "av1": "av1_metadata"}
 """Filters that bring packets into the form of streams: NAL units with start codes, OBUs with sizes."""
@@ -54,7 +61,8 @@ class VideoTimes:
         fps: pictures a second; 0 where nothing says so.
         left_out: how many pictures are left out, by the reason.
         cut_off: why the file could not be read to its end; empty where it could.
-        unsure: gaps behind which pictures may build on missing ones, since their codec does not tell.
+        set_back: by how many seconds the file's clock was set back, each time; times go on from there.
+        pauses: gaps in time that are taken for pauses, though their codec does not tell.
     """
 
     stamps: tuple[int, ...]
@@ -65,7 +73,8 @@ class VideoTimes:
     fps: float
     left_out: Mapping[str, int]
     cut_off: str = ""
-    unsure: int = 0
+    pauses: int = 0
+    set_back: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,45 +88,66 @@ class _Packet:
     why: str | None
 
 
-def read_times(container: InputContainer, stream: VideoStream) -> VideoTimes:
+def read_times(container: InputContainer, stream: VideoStream, gaps: Gaps | None = None) -> VideoTimes:
     """Go through the packets of an opened file once.
+
+    Args:
+        gaps: what gaps in time are where the codec does not tell; None: lost pictures where they are rare.
 
     Raises:
         av.error.FFmpegError: it is damaged.
     """
     broken: list[str] = []
-    packets = list(_packets(container, stream, broken.append))
-    cut_off = "".join(broken)
-    left_out = Counter(packet.why for packet in packets if packet.why is not None)
-    whole = [packet for packet in packets if packet.why is None]
+    set_back: list[float] = []
+    packets = list(_packets(container, stream, broken.append, set_back.append))
+    by_order = container.format.name in _BY_DECODING_TIME
     timeless = Flags.no_timestamps in Flags(container.format.flags) or container.format.name in _TIMELESS
-    timeless |= any(packet.pts is None for packet in whole)
+    timeless |= any(packet.pts is None for packet in packets if packet.why is None)
     reordered = bool(stream.codec_context.has_b_frames)
-    early = left_out[NOT_STARTED] if timeless else 0
-    if timeless or container.format.name in _BY_DECODING_TIME:
+    codec, pauses = stream.codec_context.codec.canonical_name, 0
+    if codec not in _TELL_LOSSES | _STATE_DURATIONS and not timeless and not (by_order and reordered):
+        packets, pauses = _gaps_judged(packets, by_order, reordered, gaps)
+    left_out = Counter(packet.why for packet in packets if packet.why is not None)
+    found = partial(
+        VideoTimes,
+        numbered=timeless or by_order,
+        counted=(timeless or by_order) and reordered,
+        early=left_out[NOT_STARTED] if timeless else 0,
+        left_out=left_out,
+        cut_off="".join(broken),
+        pauses=pauses,
+        set_back=tuple(set_back),
+    )
+    if timeless or by_order:
         whole = _placed(packets, reordered, timeless, left_out)
         numbers = tuple(packet.number for packet in whole)
         ticks = sorted({packet.dts for packet in whole if packet.dts is not None})
         if timeless or len(ticks) < len(whole):
-            return VideoTimes(numbers, True, reordered, None, early, _stated_rate(stream), left_out, cut_off)
+            return found(stamps=numbers, times_ns=None, fps=_stated_rate(stream))
         times, fps = _times(ticks, stream)
-        return VideoTimes(numbers, True, reordered, times, 0, fps, left_out, cut_off)
-    stamps = sorted({packet.pts for packet in whole if packet.pts is not None})
-    if len(stamps) < len(whole):
-        left_out[_SAME_TIME] = len(whole) - len(stamps)
+        return found(stamps=numbers, times_ns=times, fps=fps)
+    shown = [packet.pts for packet in packets if packet.why is None]
+    stamps = sorted({stamp for stamp in shown if stamp is not None})
+    if len(stamps) < len(shown):
+        left_out[_SAME_TIME] = len(shown) - len(stamps)
     times, fps = _times(stamps, stream)
-    unsure = 0 if stream.codec_context.codec.canonical_name in _TELL_LOSSES else _gaps(whole)
-    return VideoTimes(tuple(stamps), False, False, times, 0, fps, left_out, cut_off, unsure)
+    return found(stamps=tuple(stamps), times_ns=times, fps=fps)
 
 
-def _gaps(packets: Sequence[_Packet]) -> int:
-    """How often the time from a picture to the next is longer than usual, and that one is no keyframe."""
-    times = [packet.pts or 0 for packet in packets]
-    usual = typical_step_ns(times)
-    return sum(
-        after - before > _GAP_STEPS * usual and not packet.keyframe
-        for before, after, packet in zip(times, times[1:], packets[1:], strict=False)
-    )
+def _gaps_judged(
+    packets: Sequence[_Packet], by_order: bool, reordered: bool, gaps: Gaps | None
+) -> tuple[list[_Packet], int]:
+    """The packets, where those behind gaps say so; and the gaps that are taken for pauses.
+
+    Args:
+        by_order: times of decoding count.
+    """
+    whole = [packet for packet in packets if packet.why is None]
+    times = [packet.dts if by_order else packet.pts for packet in whole]
+    timed = [TimedPacket(t or 0, packet.keyframe) for t, packet in zip(times, whole, strict=True)]
+    unsure, pauses = behind_gaps(timed, reordered, gaps)
+    numbers = {whole[place].number for place in unsure}
+    return [replace(p, why=BEHIND_GAP) if p.number in numbers else p for p in packets], pauses
 
 
 def _times(ticks: Sequence[int], stream: VideoStream) -> tuple[tuple[int, ...], float]:
@@ -172,39 +202,65 @@ def _placed(
 
 
 def _packets(
-    container: InputContainer, stream: VideoStream, cut_off: Callable[[str], None]
+    container: InputContainer,
+    stream: VideoStream,
+    cut_off: Callable[[str], None],
+    set_back: Callable[[float], None],
 ) -> Iterator[_Packet]:
     """The packets whose pictures are shown, in coding order."""
     name = stream.codec_context.codec.canonical_name
     whole = WholePictures(name)
     plain = BitStreamFilterContext(_PLAIN[name], stream) if name in _PLAIN else None
     started, first = False, None
-    for number, packet in enumerate(with_data(container, stream, cut_off)):
+    held: _Packet | None = None
+    found_loss = False
+    for number, packet in enumerate(with_data(container, stream, cut_off, set_back)):
         pts, dts, discard, keyframe = packet.pts, packet.dts, packet.is_discard, packet.is_keyframe
         started = started or keyframe
         first = pts if first is None and started else first
-        why = _reason(packet, plain, whole)
+        # FFmpeg may find a loss on the way a picture earlier or later than it was.
+        found_before, found_loss = found_loss, packet.is_corrupt
+        if held is not None:
+            yield replace(held, why=held.why or _DAMAGED) if found_loss else held
+        why = _reason(packet, plain, whole, lost=found_loss or found_before)
         if why is None and (not started or (pts is not None and first is not None and pts < first)):
             # Pictures that are shown before the first keyframe build on what came before it.
             why = NOT_STARTED
-        if why is not None or not discard:
-            yield _Packet(number, pts, dts, keyframe, why)
+        held = _Packet(number, pts, dts, keyframe, why) if why is not None or not discard else None
+    if held is not None:
+        yield held
 
 
 def with_data(
-    container: InputContainer, stream: VideoStream, cut_off: Callable[[str], None] = lambda _why: None
+    container: InputContainer,
+    stream: VideoStream,
+    cut_off: Callable[[str], None] = lambda _why: None,
+    set_back: Callable[[float], None] = lambda _seconds: None,
 ) -> Iterator[Packet[VideoStream]]:
     """The packets that hold something: their places are their numbers.
 
     Args:
         cut_off: told why a file cannot be read to its end, where it has a beginning.
+        set_back: told by how many seconds, each time that the clock is set back; times go on from there.
     """
-    count = 0
+    count = shift = 0
+    last: int | None = None
+    latest = 0
     try:
         for packet in container.demux(stream):
-            if packet.size:
-                yield packet
-                count += 1
+            if not packet.size:
+                continue
+            if packet.dts is not None:
+                assert packet.time_base is not None
+                if last is not None and packet.dts + shift < last - _SET_BACK_S / packet.time_base:
+                    set_back(float((last - shift - packet.dts) * packet.time_base))
+                    shift = latest + max(packet.duration or 0, 1) - packet.dts
+                last = packet.dts = packet.dts + shift
+            if packet.pts is not None:
+                packet.pts += shift
+            latest = max(latest, last or 0, packet.pts or 0)
+            yield packet
+            count += 1
     except FFmpegError as error:
         if not count:
             raise
@@ -212,10 +268,17 @@ def with_data(
 
 
 def _reason(
-    packet: Packet[VideoStream], plain: BitStreamFilterContext | None, whole: WholePictures
+    packet: Packet[VideoStream], plain: BitStreamFilterContext | None, whole: WholePictures, lost: bool
 ) -> str | None:
-    """Why a packet gives no whole picture. The filter takes the packet's data away."""
+    """Why a packet gives no whole picture. The filter takes the packet's data away.
+
+    Args:
+        lost: part of it was lost on the way.
+    """
     pts = packet.pts
+    if lost:
+        whole.lose(BUILDS_ON_LOSS)
+        return _DAMAGED
     if packet.has_sidedata("encryption_info"):
         whole.lose(BUILDS_ON_LOSS)
         return _ENCRYPTED

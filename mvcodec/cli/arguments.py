@@ -41,6 +41,7 @@ OPTIONS = {
     "threads": "--threads",
     "anchors": "--anchors",
     "bits": "--bits",
+    "gaps": "--gaps",
     "board": "--board",
     "board_input": "--board-input",
     "clock": "--clock",

@@ -185,6 +185,7 @@ def _opened(arguments: argparse.Namespace) -> Iterator[Recording | LiveCameras]:
         bits=arguments.bits,
         depth_topics=_depth_grid(arguments),
         split=split,
+        gaps=arguments.gaps,
     )
     on_damage = reading_of(arguments).on_unreadable
     paths: list[Path] = arguments.input

@@ -48,7 +48,7 @@ def live_cameras(arguments: argparse.Namespace) -> Iterator[LiveCameras]:
         SettingError: options that don't fit them.
         InputError: nothing comes.
     """
-    for option in ("topics", "depth_topics", "split", "bits", "sync"):
+    for option in ("topics", "depth_topics", "split", "bits", "gaps", "sync"):
         if getattr(arguments, option) is not None:
             raise SettingError(option, "with live cameras", "no such option")
     count = len(arguments.input)

@@ -13,15 +13,17 @@ from mvcodec.errors import InputError, MvCodecWarning
 
 
 def add_picture_options(parser: argparse.ArgumentParser) -> None:
-    """``--bits``, ``--split`` and ``--on-error``."""
+    """``--bits``, ``--gaps``, ``--split`` and ``--on-error``."""
     add_setting(parser, Reading, "bits")
+    add_setting(parser, Reading, "gaps")
     add_setting(parser, Reading, "split", parse=pair_of_sizes, metavar="RxC")
     add_on_error(parser, "stop", "at a picture that cannot be read: leave its frame set out, or stop")
 
 
 def reading_of(arguments: argparse.Namespace) -> Reading:
     """What the options say."""
-    return Reading(arguments.bits, _warn if arguments.on_error == "skip" else None, arguments.split)
+    told = _warn if arguments.on_error == "skip" else None
+    return Reading(arguments.bits, told, arguments.split, arguments.gaps)
 
 
 def _warn(error: InputError) -> None:
