@@ -48,7 +48,7 @@ from mvcodec.depth import require_calibration
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.speed_choice import FOR_LIVE
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
-from mvcodec.evaluation.quality_target import QualityTarget
+from mvcodec.evaluation.target_setting import QualityTarget
 from mvcodec.output.live_view import LiveView
 from mvcodec.settings import settings_of
 from mvcodec.synthesis.synthesizers import make_synthesizer

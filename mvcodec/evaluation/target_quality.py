@@ -11,8 +11,8 @@ from mvcodec.capture import ArraySource
 from mvcodec.encoding.config import EncoderConfig, find_matcher
 from mvcodec.errors import SettingError
 from mvcodec.evaluation.chain import measure_chain
-from mvcodec.evaluation.quality_target import PROBED_SETS
 from mvcodec.evaluation.remembered import MapSpool, Remembered
+from mvcodec.evaluation.target_setting import PROBED_SETS
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.video.codecs import find_codec
 
