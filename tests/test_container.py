@@ -201,30 +201,6 @@ def test_a_file_cut_before_its_first_frame_set_is_an_error(file: bytes, cut: int
         McapReader(io.BytesIO(file[:cut]))
 
 
-def _foreign() -> bytes:
-    target = io.BytesIO()
-    writer = Writer(target)
-    writer.start()
-    channel = writer.register_channel("/other", "json", writer.register_schema("Other", "jsonschema", b"{}"))
-    writer.add_message(channel, 0, b"{}", 0)
-    writer.finish()  # type: ignore[no-untyped-call]
-    return target.getvalue()
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (b"", "name.mcap: found an empty file, expected an MCAP file"),
-        (b"this is a text file, and a long one at that", "name.mcap: found a file that is not MCAP"),
-        (_foreign(), r"name.mcap: found MCAP without /mvcodec/header \(topics: /other\)"),
-    ],
-)
-def test_bad_files_are_named(content: bytes, message: str) -> None:
-    for source in (io.BytesIO(content), Pipe(content)):
-        with pytest.raises(StreamError, match=message):
-            McapReader(source, "name.mcap")  # type: ignore[arg-type]
-
-
 def test_a_newer_format_is_refused_by_its_number(coded: list[list[Packet]]) -> None:
     head = coded[0][0]
     newer = Packet(
@@ -350,8 +326,3 @@ def test_a_writer_counts_what_is_surely_in_the_file(coded: list[list[Packet]], f
         readable = _numbers(McapReader(io.BytesIO(disk.getvalue()), "cut"))
     assert 0 < cut.written_count < cut.frame_count <= len(coded)
     assert cut.written_count <= len(readable) < len(coded)
-
-
-def test_a_folder_is_told_from_a_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="found a folder, expected an MCAP file, which `mvcodec encode`"):
-        McapReader.open(tmp_path)

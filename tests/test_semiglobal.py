@@ -3,172 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 import semiglobal_twins as twins
 from numpy.typing import NDArray
-
-from mvcodec.errors import SettingError
-from mvcodec.kernels import census, completion, matching_costs, semiglobal
-from mvcodec.kernels.byte_vectors import LANES
-from mvcodec.stereo import scanlines
-from mvcodec.stereo.scanlines import MAX_SUM, Decided, Penalties, Scratch, decide
-
-SIZES = [(7, 9), (1, 1), (1, 11), (8, 1), (4, 5)]
-STEPS = {
-    "right": [(1, 0)],
-    "left": [(-1, 0)],
-    "lower, rho 0.5": [(0, 0.5)],
-    "upper, rho 2": [(0, -2)],
-    "right and lower, rho 2": [(1, 0), (0, 2)],
-    "all four, rho 0.5": [(0, -0.5), (-1, 0), (1, 0), (0, 0.5)],
-}
-LEVELS = 8
-LIMITS = (30, 2, 45)  # colour_limit, bit_cost, most_bits
-
-size_parameter = pytest.mark.parametrize("size", SIZES, ids=str)
-low_parameter = pytest.mark.parametrize("low", [-5, 0, 2])
-steps_parameter = pytest.mark.parametrize(
-    "steps", [np.array(steps, np.float32) for steps in STEPS.values()], ids=list(STEPS)
+from semiglobal_input import (
+    LEVELS,
+    SIZES,
+    levels_second,
+    low_parameter,
+    random_bytes,
+    size_parameter,
+    steps_parameter,
 )
 
-
-def random_bytes(shape: tuple[int, ...], seed: int, spread: int = 256) -> NDArray[np.uint8]:
-    return np.random.default_rng(seed).integers(0, spread, shape).astype(np.uint8)
-
-
-def levels_second(volume: NDArray[Any]) -> NDArray[Any]:
-    """Twins have (H, W, levels), kernels (H, levels, W)."""
-    return np.ascontiguousarray(volume.transpose(0, 2, 1))
-
-
-def joint_costs(
-    planes: NDArray[np.uint8],
-    census: NDArray[np.uint8],
-    bounds: NDArray[np.uint8],
-    across: NDArray[np.bool_],
-    steps: NDArray[np.float32],
-    *,
-    low: int,
-    lone_cost: int = 6,
-    levels: int = LEVELS,
-) -> NDArray[np.uint8]:
-    """Of camera 0 against all others: (H, W, levels)."""
-    width = planes.shape[3]
-    columns = -(-width // LANES) * LANES
-    volume = np.full((planes.shape[1], levels, columns), 77, np.uint8)
-
-    def with_borders(rows: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        beyond = (LANES, columns - width + LANES)
-        return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [beyond], constant_values=99)
-
-    matching_costs.joint_costs(
-        0,
-        np.arange(1, len(planes)),
-        with_borders(planes),
-        with_borders(census),
-        across,
-        with_borders(bounds),
-        width,
-        steps,
-        low,
-        *LIMITS,
-        lone_cost,
-        100,
-        0,
-        volume,
-    )
-    return volume[..., :width].transpose(0, 2, 1)
-
-
-def uniform_costs(
-    differences: list[int], bits: list[int], steps: list[tuple[float, float]], lone_cost: int = 6
-) -> NDArray[np.uint8]:
-    """Volume (1, 6, 3), low 0, where a partner differs by so much grey a channel and so many census bits."""
-    cameras = 1 + len(steps)
-    bounds = np.full((2, cameras, 1, 2, 3, 6), 100, np.uint8)
-    census = np.zeros((cameras, 1, 8, 6), np.uint8)
-    for camera, (difference, count) in enumerate(zip(differences, bits, strict=True), 1):
-        bounds[:, camera] += np.uint8(difference % 256)
-        census[camera] = np.packbits(np.arange(64) < count)[None, :, None]
-    planes = np.full((cameras, 1, 3, 6), 100, np.uint8)
-    where = np.array(steps, np.float32)
-    across = np.ones(len(steps), np.bool_)
-    return joint_costs(planes, census, bounds, across, where, low=0, lone_cost=lone_cost, levels=3)
-
-
-@size_parameter
-@pytest.mark.parametrize("along_rows", [True, False])
-def test_sampling_intervals_equal_their_plain_twin(size: tuple[int, int], along_rows: bool) -> None:
-    planes = random_bytes((size[0], 3, size[1]), 1)
-    found = np.empty((size[0], 2, 3, size[1]), np.uint8)
-    matching_costs.sampling_interval(planes, along_rows, found)
-    np.testing.assert_array_equal(found, twins.sampling_interval(planes, along_rows=along_rows))
-
-
-def test_sampling_interval_reaches_half_way_to_the_neighbours() -> None:
-    ramp = np.array([[[0, 10, 41]]], np.uint8)
-    found = np.empty((1, 2, 1, 3), np.uint8)
-    matching_costs.sampling_interval(ramp, True, found)
-    assert found[0, :, 0].tolist() == [[0, 5, 25], [5, 26, 41]]
-    matching_costs.sampling_interval(ramp, False, found)  # across the baseline nothing changes
-    assert found[0, :, 0].tolist() == [[0, 10, 41]] * 2
-
-
-@size_parameter
-@pytest.mark.parametrize("radii", [(1, 1), (2, 2), (4, 3)], ids=str)
-def test_census_rows_equal_their_plain_twin(size: tuple[int, int], radii: tuple[int, int]) -> None:
-    grey = random_bytes(size, 2, 20)
-    expected = twins.census_rows(grey, *radii)
-    found = np.full(expected.shape, 77, np.uint8)
-    census.census_rows(grey, *radii, found)
-    np.testing.assert_array_equal(found, expected)
-
-
-@size_parameter
-@low_parameter
-@steps_parameter
-def test_joint_costs_equal_their_plain_twin(
-    size: tuple[int, int], low: int, steps: NDArray[np.float32]
-) -> None:
-    cameras = 1 + len(steps)
-    planes = random_bytes((cameras, size[0], 3, size[1]), 3, spread=60)
-    bits = random_bytes((cameras, size[0], 8, size[1]), 4)
-    bounds = np.sort(random_bytes((2, cameras, size[0], 2, 3, size[1]), 5, spread=60), axis=3)
-    across = steps[:, 0] != 0
-    expected = twins.joint_costs(planes, bits, bounds, across, steps, low, LIMITS, 6, 100, LEVELS)
-    np.testing.assert_array_equal(joint_costs(planes, bits, bounds, across, steps, low=low), expected)
-
-
-def test_cost_adds_colour_and_census() -> None:
-    # 3 channels of 5 grey levels, in twos; 4 bits of 2.
-    assert (uniform_costs([5], [4], [(0, 0)]) == 7 + 8).all()
-    assert (uniform_costs([-5], [4], [(0, 0)]) == 7 + 8).all()
-
-
-def test_colour_and_census_are_truncated_each() -> None:
-    assert (uniform_costs([100], [0], [(0, 0)]) == 30).all()
-    assert (uniform_costs([0], [64], [(0, 0)]) == 90).all()
-    assert (uniform_costs([100], [64], [(0, 0)]) == 120).all()
-
-
-def test_two_best_partners_count_half_each() -> None:
-    costs = uniform_costs([4, 6, 9, 20], [0] * 4, [(0, 0)] * 4)  # 6, 9, 13, 30
-    assert (costs == 8).all()  # 7.5, rounded up
-
-
-def test_a_partner_that_cannot_see_the_pixel_is_outvoted_at_lone_cost() -> None:
-    assert (uniform_costs([4, 20], [0, 30], [(0, 0)] * 2) == 6 + 6).all()
-    assert (uniform_costs([20, 4], [30, 0], [(0, 0)] * 2, lone_cost=3) == 6 + 3).all()
-
-
-def test_only_partner_of_an_array_pays_no_lone_cost_but_the_only_one_in_frame_does() -> None:
-    one = uniform_costs([4], [0], [(1, 0)])[0]
-    assert one.T.tolist() == [[6] * 6, [100, *[6] * 5], [100, 100, *[6] * 4]]
-    two = uniform_costs([4, 4], [0, 0], [(1, 0), (0, 1)])[0]  # a lower partner of one row: in frame at 0 px
-    assert two.T.tolist() == [[6] * 6, [100, *[12] * 5], [100, 100, *[12] * 4]]
+from mvcodec.errors import SettingError
+from mvcodec.kernels import completion, semiglobal
+from mvcodec.stereo import scanlines
+from mvcodec.stereo.scanlines import MAX_SUM, Decided, Penalties, Scratch, decide
 
 
 def decided(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 import view_twins as twins
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from view_kernel_input import SHAPES, Shape, in_bands, in_steps, seeds, shapes, smoother, some_maps
 
 from mvcodec.frames import FloatMap, Mask
 from mvcodec.kernels import (
@@ -23,44 +22,12 @@ from mvcodec.kernels import (
 )
 from mvcodec.synthesis.layered import LayeredSettings
 
-SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11), (14, 8)]
-seeds = st.integers(0, 2**32 - 1)
-shapes = st.tuples(st.integers(1, 12), st.integers(1, 12))
-Shape = tuple[int, int]
 Planes = tuple[NDArray[np.int16], NDArray[np.int16], NDArray[np.float32], NDArray[np.float32]]
-Run = Callable[[int, int], None]
 
 
 def test_the_kernels_share_one_value_for_the_unknown() -> None:
     assert np.float32(twins.UNKNOWN) == view_depth.UNKNOWN
     assert view_fetch.CONTOUR < -1e6
-
-
-def some_maps(rng: np.random.Generator, count: int, shape: Shape, holes: float = 0.0) -> NDArray[np.float32]:
-    """Maps of few surfaces of either sign in multiples of 1/16 px, so that float32 has no rounding to do."""
-    surfaces = rng.integers(-96, 97, 4) / 16
-    maps = rng.choice(surfaces, (count, *shape)) + rng.integers(-4, 5, (count, *shape)) / 16
-    maps = np.where(rng.random(maps.shape) < holes, twins.UNKNOWN, maps)
-    return np.ascontiguousarray(maps, np.float32)
-
-
-def smoother(maps: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float32]:
-    """The same, in which whole blocks of pixels lie on one surface, as on a real map."""
-    block = int(rng.integers(1, 12))
-    height, width = maps.shape[1:]
-    rows, columns = np.arange(height) // block * block, np.arange(width) // block * block
-    return np.ascontiguousarray(maps[:, rows][:, :, columns])
-
-
-def in_bands(height: int, out: NDArray[np.float32] | NDArray[np.uint8], run: Run) -> None:
-    """Run a kernel band by band, and see that each leaves the rows of the others alone."""
-    cut = height // 3
-    for first, last in ((cut, height), (0, cut)):
-        others = np.ones(height, np.bool_)
-        others[first:last] = False
-        before = out[others].copy()
-        run(first, last)
-        np.testing.assert_array_equal(out[others], before)
 
 
 # --- moving a map to the view
@@ -105,96 +72,6 @@ def test_splat_closes_the_cracks_of_a_stretched_surface() -> None:
     )
     assert not nearest.all()
     assert wider.all()
-
-
-# --- the vote
-
-LIMITS = twins.Limits(tolerance=1.5, contrast=10, ratio=1.3, denial=0.6)
-
-
-def in_steps(levels: NDArray[np.floating]) -> NDArray[np.int16]:
-    """Grey levels as the kernels take them."""
-    return np.asarray(np.rint(levels * view_vectors.LEVELS), np.int16)
-
-
-def voted(maps: NDArray[np.float32], ballot: twins.Ballot, limits: twins.Limits) -> FloatMap:
-    out = np.full((maps.shape[1] - 2, maps.shape[2] - 2), np.nan, np.float32)
-    cameras = np.arange(len(maps))
-    who = cameras, ballot.maps, in_steps(ballot.lumas), ballot.shifts, ballot.weights
-    in_bands(out.shape[0], out, lambda *band: view_depth.vote(maps, *who, *limits, out, *band))
-    return out
-
-
-@settings(max_examples=60, deadline=None)
-@given(
-    seeds,
-    shapes,
-    st.integers(1, 4),
-    st.sampled_from([0.0, 0.3, 1.0]),
-    st.builds(
-        twins.Limits,
-        st.sampled_from([0.25, 1.5, 1000.0]),
-        st.sampled_from([0.5, 20.5]),
-        st.sampled_from([1.0, 1.5, 2.0]),
-        st.sampled_from([0.0, 0.6]),
-    ),
-)
-def test_vote(seed: int, shape: Shape, count: int, holes: float, limits: twins.Limits) -> None:
-    rng = np.random.default_rng(seed)
-    maps = some_maps(rng, count, (shape[0] + 2, shape[1] + 2), holes)
-    lumas = rng.choice(np.array([7, 25, 90], np.float32), (count, shape[0] + 4, shape[1] + 4))
-    shifts = (rng.integers(-8, 9, (count, 2)) / 7).astype(np.float32)
-    weights = (rng.integers(1, 17, count) / 16).astype(np.float32)
-    ballot = twins.Ballot(some_maps(rng, count, shape), lumas, shifts, weights)
-    found, expected = voted(maps, ballot, limits), twins.vote(maps, ballot, limits)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-4)
-    assert holes < 1 or (found == view_depth.UNKNOWN).all()
-
-
-@pytest.mark.parametrize(
-    ("disparities", "weights", "expected"),
-    [
-        ([3.0, 3.0, 3.0, 20.0], [1, 1, 1, 1], 3.0),
-        ([3.0, 3.0, 20.0, 20.0], [1, 1, 1, 1], 20.0),
-        ([3.0, 3.0, 20.0, 20.0], [2, 2, 1, 1], 3.0),
-        ([-5.0, -4.0], [1, 3], -4.25),
-        ([4.0, 3.0, 2.0], [1, 1, 1], 3.5),  # 2 is not within 1.5 px of 4, and alone
-        ([twins.UNKNOWN, -7.0, twins.UNKNOWN], [1, 0.125, 1], -7.0),
-        ([20.0, 10.0, 0.0], [1, 1.25, 1.25], 20.0),
-        ([20.0, 10.0, 0.0], [1, 1.25, 1.5], 0.0),
-        ([20.0, 10.0, 0.0], [1, 1.5, 1.75], 10.0),  # 0 is measured against 10, the winner so far
-    ],
-)
-def test_vote_of_one_pixel(disparities: list[float], weights: list[float], expected: float) -> None:
-    maps = np.full((len(disparities), 3, 3), twins.UNKNOWN, np.float32)
-    maps[:, 1, 1] = disparities
-    count = len(disparities)
-    hidden = np.full((count, 1, 1), 1000, np.float32)  # nobody sees through anything
-    grey, still = np.zeros((count, 5, 5), np.float32), np.zeros((count, 2), np.float32)
-    ballot = twins.Ballot(hidden, grey, still, np.array(weights, np.float32))
-    assert voted(maps, ballot, LIMITS)[0, 0] == pytest.approx(expected, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("beyond", "luma", "expected"),
-    [
-        (2.0, 99.0, 2.0),  # the other camera sees the background where the near surface would stand
-        (2.0, 55.0, 20.0),  # but the picture there is that of the near surface: its map is wrong
-        (20.0, 99.0, 20.0),  # it sees something else as near there
-        (30.0, 99.0, 20.0),  # something nearer hides the place from it
-    ],
-)
-def test_a_near_surface_that_another_camera_sees_through_loses(
-    beyond: float, luma: float, expected: float
-) -> None:
-    maps = np.full((2, 3, 12), twins.UNKNOWN, np.float32)
-    maps[:, 1, 1] = 20, 2
-    said = np.full((2, 1, 10), 2, np.float32)
-    lumas = np.full((2, 5, 14), 50, np.float32)
-    said[1, 0, 5], lumas[1] = beyond, luma
-    shifts = np.array([[-0.25, 0], [0.25, 0]], np.float32)  # at 20 px, the second camera's column is 5
-    ballot = twins.Ballot(said, lumas, shifts, np.ones(2, np.float32))
-    assert voted(maps, ballot, LIMITS)[0, 0] == expected
 
 
 # --- filling

@@ -1,0 +1,92 @@
+"""Costs of the default matcher: every kernel against its plain twin, and small cases worked by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import semiglobal_twins as twins
+from numpy.typing import NDArray
+from semiglobal_input import (
+    LEVELS,
+    LIMITS,
+    joint_costs,
+    low_parameter,
+    random_bytes,
+    size_parameter,
+    steps_parameter,
+    uniform_costs,
+)
+
+from mvcodec.kernels import census, matching_costs
+
+
+@size_parameter
+@pytest.mark.parametrize("along_rows", [True, False])
+def test_sampling_intervals_equal_their_plain_twin(size: tuple[int, int], along_rows: bool) -> None:
+    planes = random_bytes((size[0], 3, size[1]), 1)
+    found = np.empty((size[0], 2, 3, size[1]), np.uint8)
+    matching_costs.sampling_interval(planes, along_rows, found)
+    np.testing.assert_array_equal(found, twins.sampling_interval(planes, along_rows=along_rows))
+
+
+def test_sampling_interval_reaches_half_way_to_the_neighbours() -> None:
+    ramp = np.array([[[0, 10, 41]]], np.uint8)
+    found = np.empty((1, 2, 1, 3), np.uint8)
+    matching_costs.sampling_interval(ramp, True, found)
+    assert found[0, :, 0].tolist() == [[0, 5, 25], [5, 26, 41]]
+    matching_costs.sampling_interval(ramp, False, found)  # across the baseline nothing changes
+    assert found[0, :, 0].tolist() == [[0, 10, 41]] * 2
+
+
+@size_parameter
+@pytest.mark.parametrize("radii", [(1, 1), (2, 2), (4, 3)], ids=str)
+def test_census_rows_equal_their_plain_twin(size: tuple[int, int], radii: tuple[int, int]) -> None:
+    grey = random_bytes(size, 2, 20)
+    expected = twins.census_rows(grey, *radii)
+    found = np.full(expected.shape, 77, np.uint8)
+    census.census_rows(grey, *radii, found)
+    np.testing.assert_array_equal(found, expected)
+
+
+@size_parameter
+@low_parameter
+@steps_parameter
+def test_joint_costs_equal_their_plain_twin(
+    size: tuple[int, int], low: int, steps: NDArray[np.float32]
+) -> None:
+    cameras = 1 + len(steps)
+    planes = random_bytes((cameras, size[0], 3, size[1]), 3, spread=60)
+    bits = random_bytes((cameras, size[0], 8, size[1]), 4)
+    bounds = np.sort(random_bytes((2, cameras, size[0], 2, 3, size[1]), 5, spread=60), axis=3)
+    across = steps[:, 0] != 0
+    expected = twins.joint_costs(planes, bits, bounds, across, steps, low, LIMITS, 6, 100, LEVELS)
+    np.testing.assert_array_equal(joint_costs(planes, bits, bounds, across, steps, low=low), expected)
+
+
+def test_cost_adds_colour_and_census() -> None:
+    # 3 channels of 5 grey levels, in twos; 4 bits of 2.
+    assert (uniform_costs([5], [4], [(0, 0)]) == 7 + 8).all()
+    assert (uniform_costs([-5], [4], [(0, 0)]) == 7 + 8).all()
+
+
+def test_colour_and_census_are_truncated_each() -> None:
+    assert (uniform_costs([100], [0], [(0, 0)]) == 30).all()
+    assert (uniform_costs([0], [64], [(0, 0)]) == 90).all()
+    assert (uniform_costs([100], [64], [(0, 0)]) == 120).all()
+
+
+def test_two_best_partners_count_half_each() -> None:
+    costs = uniform_costs([4, 6, 9, 20], [0] * 4, [(0, 0)] * 4)  # 6, 9, 13, 30
+    assert (costs == 8).all()  # 7.5, rounded up
+
+
+def test_a_partner_that_cannot_see_the_pixel_is_outvoted_at_lone_cost() -> None:
+    assert (uniform_costs([4, 20], [0, 30], [(0, 0)] * 2) == 6 + 6).all()
+    assert (uniform_costs([20, 4], [30, 0], [(0, 0)] * 2, lone_cost=3) == 6 + 3).all()
+
+
+def test_only_partner_of_an_array_pays_no_lone_cost_but_the_only_one_in_frame_does() -> None:
+    one = uniform_costs([4], [0], [(1, 0)])[0]
+    assert one.T.tolist() == [[6] * 6, [100, *[6] * 5], [100, 100, *[6] * 4]]
+    two = uniform_costs([4, 4], [0, 0], [(1, 0), (0, 1)])[0]  # a lower partner of one row: in frame at 0 px
+    assert two.T.tolist() == [[6] * 6, [100, *[12] * 5], [100, 100, *[12] * 4]]
