@@ -221,6 +221,12 @@ def test_auto_leaves_all_maps_to_the_decoder_where_there_are_pairs() -> None:
     config = EncoderConfig(qp=30, disparity_cameras="auto")
     assert config.cameras_for(make_array()) == "none"
     assert config.cameras_for(make_array(rows=1, cols=1)) == "all"
+    assert EncoderConfig(qp=20, prediction="synthesis").cameras_for(make_array()) == "alternate"
+    predicted = EncoderConfig(qp=30, disparity_cameras="auto", prediction="synthesis")
+    assert predicted.use_for(make_array()) == "prediction"
+    assert predicted.use_for(make_array(rows=1, cols=1)) == "all"
+    enhanced = EncoderConfig(qp=30, disparity_cameras="auto", enhance="auto")
+    assert enhanced.use_for(make_array()) == "all"  # its maps serve most views anyway
     assert EncoderConfig(qp=None, bitrate_kbps=800, disparity_cameras="none").rate_of_pictures(
         make_array()
     ).bitrate_kbps == pytest.approx(200)

@@ -27,7 +27,7 @@ from mvcodec.errors import MvCodecWarning, StreamError
 from mvcodec.frames import DecodedSet
 from mvcodec.stream import Packet, PredictedCamera, StreamHeader, Track, TrackKind
 
-FORM: dict[str, Any] = {"prediction": "synthesis"}
+FORM: dict[str, Any] = {"prediction": "synthesis", "disparity_cameras": "all"}
 
 
 def predicted_file(array: CameraArray | None = None, frames: int = 3, **changes: object) -> bytes:
@@ -158,7 +158,7 @@ def without(packets: list[Packet], lost: Track) -> list[Packet]:
 def test_who_misses_a_reference_is_made_from_the_others_until_its_keyframe(
     lost: Track, absent: set[Position]
 ) -> None:
-    sets = encode(make_array(), 4, gop=2, disparity_cameras="alternate", **FORM)
+    sets = encode(make_array(), 4, gop=2, **{**FORM, "disparity_cameras": "alternate"})
     packets = [
         packet
         for number, each in enumerate(sets)
@@ -234,7 +234,7 @@ def test_without_maps_some_are_sent_for_prediction_alone_and_decoders_estimate(t
 
 
 def test_a_use_of_maps_that_cannot_be_is_refused() -> None:
-    document = json.loads(encode(make_array(), 1, **FORM, disparity_cameras="none")[0][0].data)
+    document = json.loads(encode(make_array(), 1, **{**FORM, "disparity_cameras": "none"})[0][0].data)
     for change, message in (
         ({"disparity_use": "some"}, "disparity_use: found some, expected all or prediction"),
         ({"disparity_cameras": "none", "prediction": None}, "disparity_use: found prediction, expected all"),

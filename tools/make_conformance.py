@@ -98,6 +98,9 @@ CASES: dict[str, Case] = {
     "predicted": Case(
         _calibrated(), (0, 1, 2), {"qp": 32, "gop": 2, "disparity_scale": 2, "prediction": "synthesis"}
     ),
+    "predicted_no_maps": Case(
+        _calibrated(), (0, 1, 2), {"qp": 32, "gop": 2, "disparity_cameras": "none", "prediction": "synthesis"}
+    ),
     "enhanced": Case(
         _calibrated(),
         (0, 1, 2),

@@ -77,8 +77,8 @@ class Recording:
     ) -> None:
         self.name = name
         self._settings, self._on_damage = settings, on_damage
-        self._topics = settings.real_topics()
-        rows, real = len(settings.topics), set(self._topics.values())
+        self._topics = settings.read_topics()
+        rows, real = len(settings.topics), set(product(*select_real(settings.real, *settings.grid)))
         for row, names in enumerate(settings.depth_topics or ()):
             self._topics |= {name: (rows + row, col) for col, name in enumerate(names) if (row, col) in real}
         self._names = {position: topic for topic, position in self._topics.items()}
@@ -129,7 +129,7 @@ class Recording:
 
     def frame_sets(self) -> Iterator[FrameSet]:
         """Frame sets in order, numbered from 0; warnings at the end count what was dropped."""
-        array, rows, real = self.array, len(self._settings.topics), set(self.array.real)
+        array, rows, views = self.array, len(self._settings.topics), self._settings.views
         size, (down, across) = (array.width, array.height), self._settings.split
         for index, (time_ns, found) in enumerate(chain(self._first, self._sets)):
             pictures: dict[Position, Picture] = {}
@@ -147,7 +147,7 @@ class Recording:
                     raise InputError(label, found_size, expected)
                 picture = np.asarray(values, np.uint8)
                 for inner_row, inner_col in product(range(down), range(across)):
-                    if (place := (row * down + inner_row, col * across + inner_col)) in real:
+                    if (place := (row * down + inner_row, col * across + inner_col)) in views:
                         pictures[place] = cut_out(picture, inner_row, inner_col, size)
             self._count = index + 1
             yield FrameSet(index, time_ns, dict(sorted(pictures.items())), given)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, product
 from typing import get_args
 
 from mvcodec.array import Calibration, Position
@@ -29,6 +29,7 @@ class RecordingSettings:
         offsets_ms: what is added to a topic's times.
         real, fps, tolerance_ms, clock, bits, split, gaps: explained by their fields.
         depth_topics: of the depth of every view, rows as `topics` has them; None: there is none.
+        others: views beside the real cameras whose pictures are read too; None: all.
 
     Raises:
         SettingError: the grid is not one, names a topic twice, or a number is out of range.
@@ -49,6 +50,7 @@ class RecordingSettings:
     depth_topics: TopicGrid | None = None
     split: tuple[int, int] = views_in_pictures((1, 1))
     gaps: Gaps | None = gaps_field()
+    others: Collection[Position] | None = ()
 
     def __post_init__(self) -> None:
         widths = {len(row) for row in self.topics}
@@ -73,15 +75,27 @@ class RecordingSettings:
         """(rows, cols) of views."""
         return len(self.topics) * self.split[0], len(self.topics[0]) * self.split[1]
 
-    def real_topics(self) -> dict[str, Position]:
-        """The topics with real cameras in their pictures, each with its place in `topics`.
+    @property
+    def views(self) -> frozenset[Position]:
+        """The views whose pictures are read.
 
         Raises:
             SettingError: `real` doesn't fit the grid.
         """
-        axes = zip(select_real(self.real, *self.grid), self.split, strict=True)
-        rows, cols = (dict.fromkeys(place // held for place in axis) for axis, held in axes)
-        return {self.topics[row][col]: (row, col) for row in rows for col in cols}
+        rows, cols = self.grid
+        every = set(product(range(rows), range(cols)))
+        real = product(*select_real(self.real, rows, cols))
+        return frozenset(every if self.others is None else {*real, *every.intersection(self.others)})
+
+    def read_topics(self) -> dict[str, Position]:
+        """The topics with such views in their pictures, each with its place in `topics`.
+
+        Raises:
+            SettingError: `real` doesn't fit the grid.
+        """
+        down, across = self.split
+        places = sorted({(row // down, col // across) for row, col in self.views})
+        return {self.topics[row][col]: (row, col) for row, col in places}
 
     def offsets_ns(self, topics: Sequence[str]) -> dict[str, int]:
         """Offsets by topic.

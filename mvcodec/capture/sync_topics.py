@@ -25,7 +25,7 @@ def with_offsets(
     Raises:
         InputError: nothing tells how far a camera's clock is apart.
     """
-    topics = list(settings.real_topics())
+    topics = list(settings.read_topics())
     signals: dict[str, Motion] = {}
     steps: dict[str, Sequence[int]] = {}
     for topic in topics:

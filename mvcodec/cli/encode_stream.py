@@ -186,6 +186,7 @@ def _opened(arguments: argparse.Namespace) -> Iterator[Recording | LiveCameras]:
         depth_topics=_depth_grid(arguments),
         split=split,
         gaps=arguments.gaps,
+        others=() if arguments.enhance is None else arguments.enhance_views,
     )
     on_damage = reading_of(arguments).on_unreadable
     paths: list[Path] = arguments.input

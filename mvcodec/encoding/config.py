@@ -29,7 +29,7 @@ DISPARITY_SHARE = 0.12
 shop_v3, 0.06 to 0.08 on shop_v4 and 0.10 to 0.16 on the sample, for pictures of QP 27 to 35."""
 
 PREDICTING_CAMERAS = "alternate"
-"""Which cameras send a map where maps serve prediction alone."""
+"""Which cameras send a map where others are predicted by it: the cheapest, see `docs/prediction.md`."""
 
 PREDICTING_EXTRA = 0
 """QPs, on libx264's scale, that such maps are coarser by."""
@@ -100,7 +100,7 @@ class EncoderConfig:
         " none: decoders estimate all maps, which takes them as long as it takes encoders (beside predicted"
         " pictures some are sent, for prediction alone), and readers of format version 1 refuse the file;"
         " auto: what costs fewest bits at equal quality (default: all or alternate, chosen for the pictures'"
-        " quantiser)",
+        " quantiser; beside predicted pictures alternate)",
         choices=(*DISPARITY_CAMERAS, AUTO),
     )
     prediction: str = setting(
@@ -210,12 +210,18 @@ class EncoderConfig:
         given = self.disparity_cameras
         if given is not None and given != AUTO:
             return given
+        if self.prediction != "none" and len(array.real) > 1:
+            return PREDICTING_CAMERAS
         return default_disparity_cameras(self.quality, self.codec, array)
 
     def use_for(self, array: CameraArray) -> str:
         """What the maps are for, as `StreamHeader.disparity_use`."""
-        predicts = self.enhance is not None or (self.prediction != "none" and len(array.real) > 1)
-        return "prediction" if predicts and self.disparity_cameras == "none" else "all"
+        cameras = self.prediction != "none" and len(array.real) > 1
+        if self.disparity_cameras == AUTO and cameras and self.enhance is None:
+            estimated = best_disparity_cameras(self.quality, self.codec, array) == "none"
+        else:
+            estimated = self.disparity_cameras == "none"
+        return "prediction" if estimated and (cameras or self.enhance is not None) else "all"
 
     def rate_of_pictures(self, array: CameraArray) -> RateControl:
         """The rate control of one camera's pictures."""
