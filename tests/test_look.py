@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -104,6 +105,20 @@ def test_a_camera_upside_down_is_told() -> None:
     assert concern.text.startswith("camera 1,1")
 
 
+@pytest.mark.parametrize(
+    ("turn", "words"),
+    [(cv2.ROTATE_90_CLOCKWISE, "counter-clockwise"), (cv2.ROTATE_90_COUNTERCLOCKWISE, "s clockwise")],
+)
+def test_a_camera_on_its_side_is_told_with_the_way_back(turn: int, words: str) -> None:
+    array, pictures = room()
+    square = {at: np.ascontiguousarray(picture[:, :270]) for at, picture in pictures.items()}
+    turned = square | {(1, 1): np.asarray(cv2.rotate(square[1, 1], turn), np.uint8)}
+    (concern,) = look_at(replace(array, width=270), turned)
+    assert concern.kind == "on its side"
+    assert concern.text.startswith("camera 1,1")
+    assert words in concern.text
+
+
 def moved_right(picture: Picture, by_px: int) -> Picture:
     wider = cv2.copyMakeBorder(picture, 0, 0, by_px, 0, cv2.BORDER_REFLECT)
     return np.asarray(wider[:, : picture.shape[1]], np.uint8)
@@ -170,3 +185,32 @@ def test_nothing_is_said_of_real_arrays(name: str) -> None:
     source = open_input([DATA / name])
     first = next(iter(source.frame_sets(slice(0, 1))))
     assert look_at(source.array, first.pictures) == []
+
+
+MIDDLE = (1, 1)
+
+
+@pytest.mark.parametrize("kind", ["dark", "blank", "mirrored", "alone"])
+def test_a_camera_that_fits_no_other_is_told_with_the_reason(kind: str) -> None:
+    array, pictures = room(3, 3)
+    picture = pictures[MIDDLE]
+    elsewhere = np.random.default_rng(0).integers(0, 256, (18, 32, 3), np.uint8)
+    made = {
+        "dark": picture // 32,
+        "blank": np.full_like(picture, 120),
+        "mirrored": np.ascontiguousarray(picture[:, ::-1]),
+        "alone": np.asarray(cv2.resize(elsewhere, SIZE), np.uint8),
+    }
+    whole = replace(array, real_rows=(0, 1, 2), real_cols=(0, 1, 2))
+    assert look_at(whole, pictures) == []
+    (concern,) = look_at(whole, pictures | {MIDDLE: made[kind]})
+    assert concern.kind == kind
+    assert "camera 1,1" in concern.text
+
+
+def test_rectify_tells_of_another_order(tmp_path: Path) -> None:
+    _, pictures = room()
+    folder = write(tmp_path, shown(pictures, COLUMNS))
+    done = mvcodec("rectify", folder, tmp_path / "rig.json")
+    assert done.returncode == 0
+    assert "columns swapped" in done.stderr

@@ -18,7 +18,7 @@ from mvcodec.cli.paths import (
     local_path,
 )
 from mvcodec.cli.progress import progress
-from mvcodec.cli.rig_option import tell_delays
+from mvcodec.cli.rig_option import tell_delays, tell_order
 from mvcodec.cli.time_options import add_time_options, timing_of
 from mvcodec.errors import SettingError
 from mvcodec.evaluation.rig_report import rig_report
@@ -128,6 +128,7 @@ def run(arguments: argparse.Namespace) -> None:
     source = open_input(arguments.input, grid=arguments.grid, real="all", timing=timing)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     tell_delays(source, chosen, arguments)
+    tell_order(source, chosen)
     found = _calibrated(source, chosen, arguments)
     text = rig_text(found.rig)
     if output.suffix.lower() == ".json":

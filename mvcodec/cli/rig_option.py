@@ -6,6 +6,7 @@ import argparse
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from mvcodec.array import CameraArray, Position
@@ -16,7 +17,8 @@ from mvcodec.errors import InputError, MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet, Picture
 from mvcodec.rigs.delay import find_delays
 from mvcodec.rigs.look import look_at
-from mvcodec.rigs.remap import RectifiedSource, Rectifier, rectified
+from mvcodec.rigs.remap import RectifiedSource, Rectifier
+from mvcodec.rigs.remap import rectified as rectified_set
 from mvcodec.rigs.rig import Rig, read_rig
 from mvcodec.stream import view_name
 
@@ -42,10 +44,24 @@ def rectified_source(source: ArraySource, chosen: range, arguments: argparse.Nam
     """The input itself, or rectified as ``--rig`` says; checked by a look at its first frame set."""
     if arguments.rig is not None:
         tell_delays(source, chosen, arguments, strict=arguments.strict)
+        if arguments.rig == AUTO:
+            tell_order(source, chosen, strict=arguments.strict)
         source = RectifiedSource(source, Rectifier(_rig_of(source, chosen, arguments)))
     first = next(iter(source.frame_sets(slice(chosen.start, chosen.start + 1))))
     look(source.array, first.pictures, source.name, strict=arguments.strict)
     return source
+
+
+def tell_order(source: ArraySource, chosen: range, *, strict: bool = False) -> None:
+    """Warn of cameras in another order, upside down, mirrored or equal, which no calibration mends.
+
+    Raises:
+        InputError: there are, and `strict` is set.
+    """
+    array = source.array
+    every = replace(array, real_rows=tuple(range(array.rows)), real_cols=tuple(range(array.cols)))
+    first = next(iter(source.frame_sets(slice(chosen.start, chosen.start + 1), array.positions)))
+    look(every, first.pictures, source.name, strict=strict, rectified=False)
 
 
 def tell_delays(
@@ -82,13 +98,20 @@ def _rig_of(source: ArraySource, chosen: range, arguments: argparse.Namespace) -
     return found.rig
 
 
-def look(array: CameraArray, pictures: Mapping[Position, Picture], name: str, *, strict: bool) -> None:
-    """Warn of what the pictures show to be wrong.
+def look(
+    array: CameraArray,
+    pictures: Mapping[Position, Picture],
+    name: str,
+    *,
+    strict: bool,
+    rectified: bool = True,
+) -> None:
+    """Warn of what the pictures show to be wrong; see `look_at`.
 
     Raises:
         InputError: something is, and `strict` is set.
     """
-    for concern in look_at(array, pictures):
+    for concern in look_at(array, pictures, rectified=rectified):
         if strict:
             raise InputError(name, concern.text, "a rectified array in the order of its cameras")
         warnings.warn(f"{name}: {concern.text}", MvCodecWarning, stacklevel=2)
@@ -115,7 +138,7 @@ class RectifiedStream:
             InputError: of the recording; or the first is wrong and that is an error.
         """
         for number, frame_set in enumerate(self._source.frame_sets()):
-            straight = frame_set if self._rectifier is None else rectified(frame_set, self._rectifier)
+            straight = frame_set if self._rectifier is None else rectified_set(frame_set, self._rectifier)
             if not number:
                 look(self.array, straight.pictures, self.name, strict=self._strict)
             yield straight

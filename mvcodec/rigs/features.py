@@ -117,7 +117,10 @@ def agreeing(
     """(M,): which matches agree with one epipolar geometry, by MAGSAC++ (Barath et al. 2020)."""
     if len(one) < FEWEST:
         return np.zeros(len(one), bool)
-    _, mask = cv2.findFundamentalMat(one, other, cv2.USAC_MAGSAC, threshold_px, 0.999, 2000)
+    try:
+        _, mask = cv2.findFundamentalMat(one, other, cv2.USAC_MAGSAC, threshold_px, 0.999, 2000)
+    except cv2.error:  # where not a single geometry could be made of any few of them
+        mask = None
     return np.zeros(len(one), bool) if mask is None else mask.ravel().astype(bool)
 
 
@@ -185,7 +188,7 @@ def standing(every: Sequence[Mapping[Position, Features]]) -> list[dict[Position
     ]
     merged = np.concatenate([far for found in distances for far in found.values()])
     still = merged[merged < STILL_PX]
-    if still.size < STILL_SHARE * merged.size:
+    if not still.size or still.size < STILL_SHARE * merged.size:
         return [dict(found) for found in every]
     bound = max(LEAST_STILL_PX, 4 * float(np.median(still)))
     return [{camera: features.kept(distances[0][camera] <= bound) for camera, features in every[0].items()}]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import cv2
@@ -21,6 +21,7 @@ from mvcodec.rigs.features import (
     match,
     neighbours,
 )
+from mvcodec.rigs.odd_camera import odd_camera
 from mvcodec.rigs.order import FEWEST_SURE, camera_name, other_order, said_disparities
 from mvcodec.workers import run_all
 
@@ -38,6 +39,7 @@ _PIXELS = 4 * 480 * 270
 _FEATURES = 700
 _SURE_SHARE = 0.5
 _OTHER_WAY_SHARE = 0.7
+_TURN_DEG = 25.0
 _EQUAL_LEVELS = 0.5
 _TEXTURE_LEVELS = 4.0
 
@@ -47,7 +49,8 @@ class Concern:
     """Something that the pictures show to be wrong.
 
     Attributes:
-        kind: `misaligned`, `order`, `equal`, `upside down` or `behind infinity`.
+        kind: `misaligned`, `order`, `equal`, `upside down`, `on its side`, `dark`, `blank`, `mirrored`,
+            `alone` or `behind infinity`.
         text: one line for people: what, how much, and what to do.
     """
 
@@ -57,20 +60,24 @@ class Concern:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """What was found: features, tracks, matches that agree, and how much smaller the copies are."""
+    """What was found: features, matches that agree, tracks, and how to match another picture."""
 
     cameras: tuple[Position, ...]
     features: Mapping[Position, Features]
     links: Mapping[tuple[Position, Position], NDArray[np.int64]]
     tracks: Tracks
+    matched: Callable[[Picture, Position], int]
 
 
-def look_at(array: CameraArray, pictures: Mapping[Position, Picture]) -> list[Concern]:
+def look_at(
+    array: CameraArray, pictures: Mapping[Position, Picture], *, rectified: bool = True
+) -> list[Concern]:
     """What is wrong with an array, as far as one frame set shows.
 
     Args:
         array: its geometry.
         pictures: uint8 (H, W, 3) RGB of every real camera.
+        rectified: they ought to be; else rows and columns may disagree.
 
     Returns:
         Nothing where all is well, or too little can be seen.
@@ -82,14 +89,17 @@ def look_at(array: CameraArray, pictures: Mapping[Position, Picture]) -> list[Co
     if concerns:
         return concerns
     seen = _found(cameras, pictures)
-    concerns = _upside_down(seen)
+    odd = odd_camera(pictures, seen.features, seen.links, seen.matched)
+    if odd is not None:
+        return [Concern(*odd)]
+    concerns = _turned(seen)
     if concerns:
         return concerns
     places = np.array([_place(array, camera) for camera in cameras], np.float64)
     order = other_order(seen.tracks, places)
     if order is not None:
         return [Concern("order", order)]
-    return [*_misaligned(seen), *_behind(array, seen, places)]
+    return [*_misaligned(seen), *_behind(array, seen, places)] if rectified else []
 
 
 def _some(array: CameraArray) -> tuple[Position, ...]:
@@ -134,16 +144,10 @@ def _found(cameras: tuple[Position, ...], pictures: Mapping[Position, Picture]) 
     scale = min(1.0, float(np.sqrt(_PIXELS / (height * width * len(cameras)))))
     most = max(220, _FEATURES * 4 // max(len(cameras), 4))
 
-    def features(at: Position) -> Features:
-        picture = pictures[at]
-        if scale < 1:
-            size = max(1, round(width * scale)), max(1, round(height * scale))
-            picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
-        found = find_features(picture, most)
-        factor = np.array([width / picture.shape[1], height / picture.shape[0]])
-        return replace(found, xy_px=(found.xy_px + 0.5) * factor - 0.5)
+    def features(picture: Picture) -> Features:
+        return _features(picture, scale, most)
 
-    found = dict(zip(cameras, run_all(features, cameras), strict=True))
+    found = dict(zip(cameras, run_all(features, [pictures[at] for at in cameras]), strict=True))
     pairs = [
         (one, other)
         for one, other in neighbours(cameras)
@@ -151,7 +155,22 @@ def _found(cameras: tuple[Position, ...], pictures: Mapping[Position, Picture]) 
     ]
     kept = run_all(lambda pair: _matches(found[pair[0]], found[pair[1]], 1.5 / scale), pairs)
     links = dict(zip(pairs, kept, strict=True))
-    return _Seen(cameras, found, links, linked(cameras, found, links, 0))
+
+    def matched(picture: Picture, other: Position) -> int:
+        return len(_matches(features(picture), found[other], 1.5 / scale))
+
+    return _Seen(cameras, found, links, linked(cameras, found, links, 0), matched)
+
+
+def _features(picture: Picture, scale: float, most: int) -> Features:
+    """Of a copy that is smaller by `scale`, in px of the picture itself."""
+    height, width = picture.shape[:2]
+    if scale < 1:
+        size = max(1, round(width * scale)), max(1, round(height * scale))
+        picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+    found = find_features(picture, most)
+    factor = np.array([width / picture.shape[1], height / picture.shape[0]])
+    return replace(found, xy_px=(found.xy_px + 0.5) * factor - 0.5)
 
 
 def _matches(one: Features, other: Features, threshold_px: float) -> NDArray[np.int64]:
@@ -161,26 +180,36 @@ def _matches(one: Features, other: Features, threshold_px: float) -> NDArray[np.
     return kept if len(kept) >= max(FEWEST, _SURE_SHARE * len(pairs)) else kept[:0]
 
 
-def _upside_down(seen: _Seen) -> list[Concern]:
-    against: dict[Position, list[Position]] = {camera: [] for camera in seen.cameras}
+def _turned(seen: _Seen) -> list[Concern]:
+    """A camera that is upside down or on its side: by the directions of features (clockwise, degrees)."""
+    against: dict[Position, list[tuple[Position, int]]] = {camera: [] for camera in seen.cameras}
     along: dict[Position, int] = dict.fromkeys(seen.cameras, 0)
     for (one, other), kept in seen.links.items():
         if len(kept) < FEWEST:
             continue
         turn = seen.features[one].angles_deg[kept[:, 0]] - seen.features[other].angles_deg[kept[:, 1]]
-        off = np.abs((turn % 360) - 180)
-        if np.mean(off < 25) > _OTHER_WAY_SHARE:
-            against[one].append(other)
-            against[other].append(one)
+        quarters = np.rint(turn / 90).astype(np.int64)
+        near = np.abs(turn - 90 * quarters) < _TURN_DEG
+        shares = [float(np.mean(near & (quarters % 4 == quarter))) for quarter in range(4)]
+        quarter = int(np.argmax(shares))
+        if quarter and shares[quarter] > _OTHER_WAY_SHARE:
+            against[one].append((other, quarter))
+            against[other].append((one, -quarter % 4))
         else:
             along[one] += 1
             along[other] += 1
     worst = max(seen.cameras, key=lambda camera: len(against[camera]) - along[camera])
     if not against[worst]:
         return []
-    upright = camera_name(against[worst][0])
-    text = f"camera {camera_name(worst)} is upside down against {upright}; turn its picture by 180 degrees"
-    return [Concern("upside down", text)]
+    upright, quarter = against[worst][0]
+    how = "upside down" if quarter == 2 else "on its side"
+    by = (
+        "180 degrees"
+        if quarter == 2
+        else f"90 degrees {'counter-clockwise' if quarter == 1 else 'clockwise'}"
+    )
+    text = f"camera {camera_name(worst)} is {how} against {camera_name(upright)}; turn its picture by {by}"
+    return [Concern(how, text)]
 
 
 def _misaligned(seen: _Seen) -> list[Concern]:
