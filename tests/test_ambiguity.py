@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import rival_twin
 from numpy.typing import NDArray
 from stereo_scene import Planes, linear_or_grid, texture
 
 from mvcodec.frames import FloatMap
-from mvcodec.stereo.ambiguity import unambiguous
+from mvcodec.kernels import rival_matches
+from mvcodec.stereo.ambiguity import contrast_scales, unambiguous
 from mvcodec.stereo.disparity_range import estimate_range
 
 DISPARITY = 5
@@ -17,10 +19,10 @@ INNER = np.s_[10:-10, 60:-60]
 """Where everything of the span lies within both pictures."""
 
 
-def pair_of(wall: NDArray[np.float64]) -> tuple[FloatMap, FloatMap, FloatMap]:
+def pair_of(wall: NDArray[np.float64]) -> tuple[NDArray[np.uint8], NDArray[np.uint8], FloatMap]:
     """The left and the right view of a wall, and its disparity."""
     width = wall.shape[1] - DISPARITY
-    left, right = (wall[:, at : at + width].astype(np.float32) for at in (0, DISPARITY))
+    left, right = (np.rint(wall[:, at : at + width]).astype(np.uint8) for at in (0, DISPARITY))
     return left, right, np.full(left.shape, DISPARITY, np.float32)
 
 
@@ -50,8 +52,31 @@ def test_a_wrong_match_is_not_the_only_one() -> None:
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 40), (40, 3)])
 def test_pictures_smaller_than_a_window_have_nothing_to_say(size: tuple[int, int]) -> None:
-    picture = texture(*size, 1)[..., 0].astype(np.float32)
+    picture = texture(*size, 1)[..., 0].astype(np.uint8)
     assert unambiguous(picture, picture, np.zeros(size, np.float32), (-2.0, 2.0)).shape == size
+
+
+@pytest.mark.parametrize("size", [(7, 13), (70, 50), (33, 64)], ids=str)
+def test_the_kernel_says_what_plain_numpy_says(size: tuple[int, int]) -> None:
+    draw = np.random.default_rng(3)
+    left, right = draw.integers(0, 256, (2, *size), np.uint8)
+    left[: size[0] // 2] //= 16
+    right[:, :-4] = left[:, 4:]
+    disparity = draw.uniform(-9, 9, size).astype(np.float32)
+    sums, squares = np.empty((2, *size), np.int32), np.empty((2, *size), np.int32)
+    for grey, total, square in zip((left, right), sums, squares, strict=True):
+        mirrored = np.pad(grey, rival_matches.RADIUS, mode="reflect")
+        rival_matches.window_sums(mirrored, np.ones_like(mirrored), total)
+        rival_matches.window_sums(mirrored, mirrored, square)
+        assert np.array_equal(square, rival_twin.window_sums(grey.astype(np.int64) ** 2))
+    own, other = np.full((2, *size), np.float32(-1))
+    rows, scales = (
+        np.pad(np.arange(size[0]), rival_matches.RADIUS, mode="reflect"),
+        contrast_scales(sums, squares),
+    )
+    rival_matches.compare_places(left, right, rows, sums, scales, disparity, -12, 7, own, other)
+    expected = rival_twin.compare_places(left, right, disparity, -12, 7)
+    np.testing.assert_allclose((own, other), expected, rtol=1e-5, atol=1e-5)
 
 
 @pytest.mark.parametrize(

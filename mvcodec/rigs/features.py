@@ -221,17 +221,12 @@ def linked(
     frame: int,
 ) -> Tracks:
     """Tracks of one frame set: features that matches join. What a camera would see twice is none."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     counts = [len(found[camera].xy_px) for camera in cameras]
     starts = np.concatenate([[0], np.cumsum(counts)])
     number = {camera: index for index, camera in enumerate(cameras)}
     ends = [kept + np.array([starts[number[end]] for end in pair]) for pair, kept in links.items()]
     edges = np.concatenate([np.empty((0, 2), np.int64), *ends])
-    total = int(starts[-1])
-    graph = coo_array((np.ones(len(edges), np.int8), (edges[:, 0], edges[:, 1])), shape=(total, total))
-    groups, label = connected_components(graph, directed=False)
+    groups, label = _connected(edges, int(starts[-1]))
     camera = np.repeat(np.arange(len(cameras)), counts)
     times = np.zeros((groups, len(cameras)), np.int64)
     np.add.at(times, (label, camera), 1)
@@ -240,6 +235,24 @@ def linked(
     usable = (times.max(axis=1) == 1) & (times.sum(axis=1) >= 2)
     seen = times[usable] > 0
     return Tracks(tuple(cameras), xy[usable], seen, np.full(len(seen), frame))
+
+
+def _connected(edges: NDArray[np.int64], total: int) -> tuple[int, NDArray[np.int64]]:
+    """(groups, label of each of `total` nodes). Few edges join a group: loading SciPy would take longer.
+
+    Args:
+        edges: int64 (E, 2).
+    """
+    first = np.arange(total)
+    while True:
+        lower = first.copy()
+        for one, other in (edges.T, edges[:, ::-1].T):
+            np.minimum.at(lower, one, first[other])
+        if np.array_equal(lower, first):
+            break
+        first = lower[lower]
+    groups, label = np.unique(first, return_inverse=True)
+    return len(groups), label
 
 
 def _joined(cameras: tuple[Position, ...], parts: Sequence[Tracks]) -> Tracks:

@@ -120,9 +120,11 @@ def _assigned(shown: Vectors, places: Vectors) -> tuple[float, tuple[int, ...]]:
     """(misfit, order): camera n stands at place order[n], by the least total distance."""
     centred, scaled = places - places.mean(axis=0), _scaled(shown, places)
     distance = np.linalg.norm(scaled[:, None] - centred[None], axis=2)
-    from scipy.optimize import linear_sum_assignment  # takes long to load, and is rarely needed
+    order = distance.argmin(axis=1)
+    if len(set(order)) < len(order):  # the nearest place of each is the best, unless two want the same
+        from scipy.optimize import linear_sum_assignment  # takes long to load, and is rarely needed
 
-    _, order = linear_sum_assignment(distance**2)
+        _, order = linear_sum_assignment(distance**2)
     worst = float(distance[np.arange(len(order)), order].max() / _spacing(places))
     return worst, tuple(int(place) for place in order)
 

@@ -247,14 +247,15 @@ def _sure_matches(left: Picture, right: Picture, span_px: tuple[float, float]) -
     sure = left_right_check(*raw_left, *raw_right, partner_is_right=True)
     values = raw_left[0]
     height, width = values.shape
-    grey, grey_right = (cv2.cvtColor(p, cv2.COLOR_RGB2GRAY).astype(np.float32) for p in (left, right))
+    levels, levels_right = (np.asarray(cv2.cvtColor(p, cv2.COLOR_RGB2GRAY), np.uint8) for p in (left, right))
+    grey, grey_right = levels.astype(np.float32), levels_right.astype(np.float32)
     columns = np.arange(width, dtype=np.float32)[None] - values
     rows = np.repeat(np.arange(height, dtype=np.float32)[:, None], width, axis=1)
     partner = cv2.remap(grey_right, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     # Noise has contrast of its own, but no likeness in the other picture: both are asked for.
     sure &= _alike(grey, np.asarray(partner, np.float32))
     sure = drop_speckles(values, sure, _MIN_PATCH_PX)
-    return values, _not_repeated(values, sure, unambiguous(grey, grey_right, values, span_px))
+    return values, _not_repeated(values, sure, unambiguous(levels, levels_right, values, span_px))
 
 
 def _not_repeated(values: FloatMap, sure: Mask, unique: Mask) -> Mask:
