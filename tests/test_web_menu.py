@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from browser_page import CHROMIUM, NO_CHROMIUM
 from numpy.typing import NDArray
-from player_files import decode_picture
-from playwright.sync_api import Page, expect
+from player_files import Running, decode_picture
+from playwright.sync_api import Browser, Page, expect
 from web_fixtures import SAMPLE, Site, open_player, pixels_of, waits_for
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
@@ -136,6 +136,7 @@ def test_a_focus_blurs_what_is_elsewhere_and_goes_off_again(tab: Page, site: Sit
 
 
 def test_the_bar_shows_a_small_picture_of_the_time_under_the_pointer(sample_page: Page) -> None:
+    sample_page.mouse.move(480, 100)  # the controls may have hidden by now
     sample_page.get_by_label("Time", exact=True).hover(position={"x": 200, "y": 10})
     expect(sample_page.locator(".peek canvas")).to_be_visible()
     expect(sample_page.locator(".peek")).to_contain_text("0:00.")
@@ -183,6 +184,28 @@ def test_a_phone_that_is_turned_looks_around(sample_page: Page) -> None:
         }
     }""")
     waits_for(sample_page, "shown.view.col > 1 && shown.view.row === 1")
+
+
+def test_a_phone_that_must_be_asked_first_is_asked_by_a_tap(
+    chromium: Browser, sample_server: Running
+) -> None:
+    phone = chromium.new_page(
+        viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True, reduced_motion="reduce"
+    )
+    phone.add_init_script(
+        "DeviceOrientationEvent.requestPermission = async () => { window.isAsked = true; return 'granted'; };"
+    )
+    phone.goto(f"{sample_server.url}?view=1,1")
+    phone.evaluate("document.querySelector('mvcodec-player').ready")
+    assert phone.evaluate("window.isAsked") is None
+    turn = phone.get_by_text("Turn the phone to look around")
+    toggle_menu(phone)
+    turn.dispatch_event("click")
+    phone.wait_for_function("window.isAsked")
+    toggle_menu(phone)
+    expect(turn).to_be_hidden()
+    expect(phone.get_by_text("Save picture")).to_be_visible()
+    phone.close()
 
 
 def test_a_hovered_look_says_disparity_and_metres(sample_page: Page) -> None:

@@ -194,6 +194,8 @@ def test_what_is_no_recording_is_said(tab: Page, site: Site) -> None:
     assert message[0]["isFatal"]
     assert "not MCAP" in message[1]
     expect(tab.get_by_role("alert")).to_contain_text("not MCAP")
+    expect(tab.get_by_role("alert").get_by_role("button", name="Open a file")).to_be_visible()
+    expect(tab.locator(".controls").get_by_label("Play")).to_be_disabled()
 
 
 def test_both_eyes_get_views_of_their_own(sample_page: Page) -> None:

@@ -112,29 +112,45 @@ export class HttpSource implements Source {
     }
     if (answer.status === NOT_SATISFIABLE) return;
     if (answer.status !== OK && answer.status !== PARTIAL) {
-      throw new FileError(`answer ${answer.status} for ${this.#url}`, "a file");
+      throw new FileError(`no file at ${this.#url} (its server answers ${answer.status})`, "an .mcap file");
     }
     if (answer.status === OK) return this.#takeWhole(answer);
     const total = /\/(\d+)$/.exec(answer.headers.get("Content-Range") ?? "")?.[1];
     if (total === undefined) throw new FileError("a range without the file's size", "Content-Range: bytes a-b/size");
     this.#size = Number(total);
-    this.#keep({ start, bytes: await this.#body(answer) });
+    this.#keep({ start, bytes: await this.#body(answer, end - start) });
   }
 
   async #takeWhole(answer: Response): Promise<void> {
-    const length = Number(answer.headers.get("Content-Length") ?? 0);
-    if (length > MOST_WHOLE_BYTES) {
-      throw new FileError(`a server without ranges and a file of ${length} bytes`, "a server that serves ranges");
-    }
-    const bytes = await this.#body(answer);
+    const bytes = await this.#body(answer, MOST_WHOLE_BYTES);
     this.#whole = true;
     this.#size = bytes.length;
     this.#blocks = [{ start: 0, bytes }];
   }
 
-  async #body(answer: Response): Promise<Uint8Array> {
-    const bytes = new Uint8Array(await answer.arrayBuffer());
-    this.traffic.bytes += bytes.length;
+  /** An answer's content. What is longer than it may be is refused before memory is taken for it, whatever was announced. */
+  async #body(answer: Response, most: number): Promise<Uint8Array> {
+    const parts: Uint8Array[] = [];
+    let size = Number(answer.headers.get("Content-Length") ?? 0);
+    if (size <= most) size = 0;
+    const reader = answer.body?.getReader();
+    while (size <= most) {
+      const { done, value } = (await reader?.read()) ?? { done: true, value: undefined };
+      if (done || value === undefined) break;
+      size += value.length;
+      parts.push(value);
+    }
+    if (size > most) {
+      void reader?.cancel();
+      throw new FileError(`an answer of ${size} bytes or more from ${this.#url}`, `${most} at most: a server that serves ranges of bytes`);
+    }
+    this.traffic.bytes += size;
+    const bytes = new Uint8Array(size);
+    let at = 0;
+    for (const part of parts) {
+      bytes.set(part, at);
+      at += part.length;
+    }
     return bytes;
   }
 

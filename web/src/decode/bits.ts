@@ -5,6 +5,11 @@ import { FileError } from "../container/limits.ts";
 /** More leading zeros than a number of 32 bits has are damage. */
 const MOST_ZEROS = 32;
 
+/** A NAL unit's content, without its head of so many bytes and its emulation prevention bytes. */
+export function payload(unit: Uint8Array, head: number): Uint8Array {
+  return unit.subarray(head).filter((byte, i, all) => !(byte === 3 && i >= 2 && all[i - 1] === 0 && all[i - 2] === 0));
+}
+
 /** Every method throws FileError where the data end before the field does. */
 export class BitReader {
   readonly #data: Uint8Array;

@@ -1,6 +1,6 @@
 /** frame_num of H.264 pictures (ITU-T H.264, 7.4.3): each one's is the number that follows. */
 
-import { BitReader } from "./bits.ts";
+import { BitReader, payload } from "./bits.ts";
 import type { PictureOrder } from "./picture_order.ts";
 
 const [SLICE, IDR_SLICE, SPS] = [1, 5, 7];
@@ -16,9 +16,9 @@ export class H264Order implements PictureOrder {
     let isThere = false;
     for (const unit of nalUnits(data)) {
       const kind = unit[0] & 31;
-      if (kind === SPS) this.#bits = frameNumBits(new BitReader(payload(unit)));
+      if (kind === SPS) this.#bits = frameNumBits(new BitReader(payload(unit, 1)));
       if ((kind !== SLICE && kind !== IDR_SLICE) || this.#bits === undefined) continue;
-      const slice = new BitReader(payload(unit.subarray(0, HEAD_BYTES)));
+      const slice = new BitReader(payload(unit.subarray(0, HEAD_BYTES), 1));
       if (slice.ue() !== 0) continue; // not the picture's first
       isThere = true;
       slice.ue();
@@ -42,11 +42,6 @@ export function* nalUnits(data: Uint8Array): Generator<Uint8Array> {
     i += 2;
   }
   if (start >= 0 && start < data.length) yield data.subarray(start);
-}
-
-/** A NAL unit's content, without its head and its emulation prevention bytes. */
-function payload(unit: Uint8Array): Uint8Array {
-  return unit.subarray(1).filter((byte, i, all) => !(byte === 3 && i >= 2 && all[i - 1] === 0 && all[i - 2] === 0));
 }
 
 /** log2_max_frame_num of a sequence parameter set (7.3.2.1.1). */

@@ -3,6 +3,7 @@
 import type { Codec } from "../container/header.ts";
 import { Av1Order } from "./av1_order.ts";
 import { H264Order } from "./h264_order.ts";
+import { HevcOrder } from "./hevc_order.ts";
 
 /** Follows one track. */
 export interface PictureOrder {
@@ -25,13 +26,6 @@ class SequenceOrder implements PictureOrder {
   }
 }
 
-/** HEVC's reference picture sets are left to the decoder. */
-class AnyOrder implements PictureOrder {
-  follows(): boolean {
-    return true;
-  }
-}
-
 export function pictureOrder(codec: Codec): PictureOrder {
   switch (codec) {
     case "h264":
@@ -41,6 +35,6 @@ export function pictureOrder(codec: Codec): PictureOrder {
     case "vp9":
       return new SequenceOrder();
     case "hevc":
-      return new AnyOrder();
+      return new HevcOrder();
   }
 }

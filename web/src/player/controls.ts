@@ -6,6 +6,7 @@ import { EYE_MODES, type Eyes } from "./drawing.ts";
 import { timeText } from "./format.ts";
 import { SPEEDS } from "./playback.ts";
 import { TEXTS } from "./texts.ts";
+import { Tilt } from "./tilt.ts";
 
 /** What the controls ask for. */
 export interface Actions {
@@ -22,6 +23,8 @@ export interface Actions {
   copyLink(): void;
   openFile(): void;
   toggleFullscreen(): void;
+  /** Ask for the phone's turns; whether that is allowed. */
+  followTilt(): Promise<boolean>;
   toggleHeadset(): void;
   showHelp(): void;
   /** A small picture of a time; undefined where there is none. */
@@ -62,6 +65,9 @@ export class Controls {
   readonly #wipe = element("input", { type: "range", min: "0", max: "1", step: "0.01", value: "0" });
   readonly #focus = element("input", { type: "range", min: "0", max: "100", step: "1", value: "0" });
   readonly #headset: HTMLButtonElement;
+  readonly #tilt: HTMLButtonElement;
+  /** What does nothing without a file. */
+  readonly #forFile: (HTMLButtonElement | HTMLInputElement | HTMLSelectElement)[] = [];
   #range: readonly [number, number] = [0, 1];
   #duration = 0;
   #peeked = 0;
@@ -77,6 +83,11 @@ export class Controls {
       actions.toggleHeadset();
     });
     this.#headset.hidden = true;
+    this.#tilt = button(TEXTS.tilt, TEXTS.tilt, async () => {
+      this.toggleMenu(false);
+      this.#tilt.hidden = await actions.followTilt();
+    });
+    this.#tilt.hidden = !Tilt.asksFirst;
     this.menu = this.#makeMenu();
     this.bar = this.#makeBar();
     this.#listen();
@@ -84,6 +95,11 @@ export class Controls {
 
   setRange(range: readonly [number, number]): void {
     this.#range = range;
+  }
+
+  /** Whether there is a file that they can do something with. */
+  enable(isOpen: boolean): void {
+    for (const control of this.#forFile) control.disabled = !isOpen;
   }
 
   /** Whether there is something to compare with. */
@@ -132,12 +148,15 @@ export class Controls {
   #makeBar(): HTMLElement {
     const actions = this.#actions;
     this.#play.classList.add("fills");
+    const [back, on] = [button(TEXTS.back, icon("back"), () => actions.step(-1)), button(TEXTS.on, icon("on"), () => actions.step(1))];
+    this.#forFile.push(back, this.#play, on, this.#timeline, this.#look, this.#speed);
+    this.#speed.value = "1";
     return element("div", { class: "controls" },
       element("div", { class: "track" }, this.#section, this.#timeline, this.#peek),
       element("div", { class: "row" },
-        button(TEXTS.back, icon("back"), () => actions.step(-1)),
+        back,
         this.#play,
-        button(TEXTS.on, icon("on"), () => actions.step(1)),
+        on,
         this.#time,
         element("span", { class: "gap" }),
         this.#look,
@@ -159,6 +178,7 @@ export class Controls {
       element("label", {}, TEXTS.wipe, this.#wipe),
       element("label", {}, TEXTS.focus, this.#focus),
       this.#headset,
+      this.#tilt,
       act(TEXTS.savePicture, () => actions.savePicture()),
       act(TEXTS.saveClip, () => actions.saveClip()),
       act(TEXTS.copyLink, () => actions.copyLink()),

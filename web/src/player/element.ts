@@ -158,7 +158,7 @@ export class MvcodecPlayer extends HTMLElement {
     const src = asked.get("src") ?? this.getAttribute("src");
     if (embedded !== null) void this.#openEmbedded(embedded.textContent ?? "", at).catch(() => {});
     else if (src !== null) void this.open(src, at).catch(() => {});
-    else this.#ui.tell(TEXTS.noFile);
+    else this.#ui.fail(TEXTS.noFile);
   }
 
   /** A recording that lies in the page itself, as base64. */
@@ -185,7 +185,8 @@ export class MvcodecPlayer extends HTMLElement {
 
   #tell(detail: ErrorDetail): void {
     this.#ui.wait(undefined);
-    this.#ui.tell(detail.message);
+    if (detail.isFatal) this.#ui.fail(detail.message);
+    else this.#ui.tell(detail.message);
     this.dispatchEvent(new CustomEvent("error", { detail }));
   }
 }

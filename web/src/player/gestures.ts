@@ -1,4 +1,4 @@
-/** Hands on the picture: drag, hover, wheel, pinch, and a phone that is turned. All in shares of the picture. */
+/** Hands on the picture: drag, hover, wheel, pinch. All in shares of the picture. */
 
 export interface GestureEvents {
   /** Somebody touches the player for the first time, or again. */
@@ -13,8 +13,6 @@ export interface GestureEvents {
   onDolly(by: number): void;
   onClick(): void;
   onDoubleClick(): void;
-  /** Degrees that the device is turned to the right and down since it was first asked. */
-  onTurn(right: number, down: number): void;
 }
 
 /** A pointer that moved less was not dragged, px. */
@@ -36,7 +34,6 @@ export class Gestures {
   #start: Place | undefined;
   #isDragged = false;
   #clicked: ReturnType<typeof setTimeout> | undefined;
-  #turned: { gamma: number; beta: number } | undefined;
   readonly #stop = new AbortController();
 
   constructor(stage: HTMLElement, events: GestureEvents) {
@@ -52,7 +49,6 @@ export class Gestures {
       events.onTouch();
       events.onDolly(-event.deltaY * WHEEL);
     }, { passive: false, signal });
-    addEventListener("deviceorientation", (event) => this.#turn(event), { signal });
   }
 
   close(): void {
@@ -115,11 +111,5 @@ export class Gestures {
   #spread(): number {
     const [one, other] = [...this.#pointers.values()];
     return one && other ? Math.hypot(one.x - other.x, one.y - other.y) : 0;
-  }
-
-  #turn(event: DeviceOrientationEvent): void {
-    if (event.gamma === null || event.beta === null) return;
-    this.#turned ??= { gamma: event.gamma, beta: event.beta };
-    this.#events.onTurn(event.gamma - this.#turned.gamma, event.beta - this.#turned.beta);
   }
 }

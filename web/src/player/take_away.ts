@@ -2,6 +2,7 @@
 
 import type { Pixels } from "../synthesis/renderer.ts";
 import { element } from "./dom.ts";
+import type { Engine } from "./engine.ts";
 import { viewText } from "./format.ts";
 
 /** Offer a file for saving. */
@@ -21,7 +22,7 @@ export async function savePicture(pixels: Pixels, name: string): Promise<void> {
 }
 
 /** Record what a canvas shows for some seconds and offer it as WebM (MP4 where there is no WebM). */
-export async function saveClip(canvas: HTMLCanvasElement, seconds: number, name: string): Promise<void> {
+async function saveClip(canvas: HTMLCanvasElement, seconds: number, name: string): Promise<void> {
   const type = ["video/webm;codecs=vp9", "video/webm", "video/mp4"].find((one) => MediaRecorder.isTypeSupported(one));
   const stream = canvas.captureStream();
   const recorder = new MediaRecorder(stream, { ...(type && { mimeType: type }), videoBitsPerSecond: 8e6 });
@@ -33,6 +34,15 @@ export async function saveClip(canvas: HTMLCanvasElement, seconds: number, name:
   await isDone;
   stream.getTracks().forEach((track) => track.stop());
   save(new Blob(parts, { type: recorder.mimeType }), `${name}.${recorder.mimeType.includes("mp4") ? "mp4" : "webm"}`);
+}
+
+/** Play the loop, or else everything, once, and offer what a canvas shows meanwhile. */
+export async function saveLoop(engine: Engine, canvas: HTMLCanvasElement): Promise<void> {
+  const { header, playback } = engine;
+  const { from, to } = playback.section ?? { from: 0, to: engine.timeOf(engine.count - 1) + 1 / header.fps };
+  await engine.seek(engine.frameAt(from));
+  engine.play();
+  await saveClip(canvas, Math.max((to - from) / playback.speed, 0.2), header.name || "view");
 }
 
 /** The page's address with a view and a time, which leads back to them. */

@@ -8,17 +8,19 @@ import { EYE_MODES } from "./drawing.ts";
 import type { Engine } from "./engine.ts";
 import { Gestures } from "./gestures.ts";
 import { hasHeadset } from "./immersive.ts";
+import { Idle } from "./idle.ts";
 import { Incoming } from "./incoming.ts";
 import { isForControl, keyActions, keyList } from "./keys.ts";
+import { Legend } from "./legend.ts";
 import { Looking } from "./looking.ts";
+import { Notice } from "./notice.ts";
 import { Probe } from "./probe.ts";
 import { Section, type Mark } from "./section.ts";
 import { statistics } from "./statistics.ts";
-import { linkTo, saveClip, savePicture } from "./take_away.ts";
+import { linkTo, saveLoop, savePicture } from "./take_away.ts";
 import { TEXTS } from "./texts.ts";
+import { Tilt } from "./tilt.ts";
 
-/** Controls hide when nothing happens for so long. */
-const IDLE_MS = 3000;
 const HINT_MS = 4000;
 const PEEK_PX = 160;
 
@@ -29,13 +31,13 @@ export class Ui {
   readonly #wait = element("p", { class: "wait", role: "status", hidden: true });
   readonly #big = button(TEXTS.play, icon("play"), () => this.togglePlay());
   readonly #hint = element("p", { class: "hint", hidden: true }, TEXTS.hint);
-  readonly #notice = element("div", { class: "notice", role: "alert", hidden: true });
+  readonly #notice = new Notice();
   readonly #stats = element("pre", { class: "stats", hidden: true });
   readonly #probe = new Probe();
   readonly #spoken = element("p", { class: "unseen", role: "status" });
   readonly #dialog = keyList();
   readonly #incoming: Incoming;
-  readonly #psnr = element("p", { class: "psnr", role: "status", hidden: true });
+  readonly #legend = new Legend();
   readonly #poster = element("img", { class: "poster", alt: "", hidden: true });
   readonly controls: Controls;
   readonly #keys: ReadonlyMap<string, () => void>;
@@ -45,7 +47,7 @@ export class Ui {
   #section = new Section();
   #isTouched = false;
   #hasPlayed = false;
-  #idle: ReturnType<typeof setTimeout> | undefined;
+  readonly #idle: Idle;
   #stop = new AbortController();
 
   constructor(host: HTMLElement, root: ShadowRoot, canvas: HTMLCanvasElement, open: (from: Blob) => void) {
@@ -53,13 +55,14 @@ export class Ui {
     this.#canvas = canvas;
     this.#incoming = new Incoming(open);
     this.controls = new Controls(this.#actions());
+    this.#idle = new Idle(this.#stage, this.controls);
     this.#keys = keyActions(this);
     this.#big.classList.add("big", "fills");
     this.#big.hidden = true;
     this.#stage.append(canvas, this.#poster);
     const middle = element("div", { class: "middle" }, this.#wait, this.#big);
     root.append(this.#stage, middle, this.#hint, this.#stats, this.#probe.label, this.controls.bar, this.controls.menu,
-      this.#notice, this.#psnr, this.#spoken, this.#dialog, this.#incoming.input);
+      this.#notice.box, this.#legend.box, this.#spoken, this.#dialog, this.#incoming.input);
   }
 
   connect(): void {
@@ -73,31 +76,32 @@ export class Ui {
       onDolly: (by) => this.dolly(by),
       onClick: () => this.#click(),
       onDoubleClick: () => this.toggleFullscreen(),
-      onTurn: (right, down) => this.looking.turn(right, down),
     });
     // The page listens everywhere, an element within another page only where it has the focus.
     const keyboard: EventTarget = this.#host.hasAttribute("page") ? document : this.#host;
     keyboard.addEventListener("keydown", (event) => this.#key(event as KeyboardEvent), { signal });
-    for (const name of ["pointermove", "focusin"]) this.#host.addEventListener(name, () => this.#awake(), { signal });
+    for (const name of ["pointermove", "focusin"]) this.#host.addEventListener(name, () => this.#idle.end(), { signal });
     this.#incoming.listen(this.#host, signal);
+    new Tilt((right, down) => this.looking.turn(right, down)).listen(signal);
     const lookForHeadset = () => void hasHeadset().then((isThere) => this.controls.offerHeadset(isThere));
     navigator.xr?.addEventListener("devicechange", lookForHeadset, { signal });
     lookForHeadset();
     const poster = this.#host.getAttribute("poster");
     this.#poster.hidden = poster === null;
     if (poster !== null) this.#poster.src = poster;
-    this.#awake();
+    this.#idle.end();
   }
 
   disconnect(): void {
     this.#stop.abort();
     this.#gestures?.close();
-    clearTimeout(this.#idle);
+    this.#idle.close();
   }
 
   attach(engine: Engine): void {
     this.#engine = engine;
-    this.#notice.hidden = true;
+    this.controls.enable(false);
+    this.#notice.hide();
     this.#hasPlayed = false;
     this.#section = new Section();
   }
@@ -107,6 +111,7 @@ export class Ui {
     const engine = this.#engine!;
     this.controls.setRange(engine.header.range);
     this.controls.offerOriginals(engine.hasOriginals);
+    this.controls.enable(true);
     this.#big.hidden = engine.count < 2 || this.#host.hasAttribute("autoplay");
     if (engine.header.predicted.length > 0) this.tell(TEXTS.predicted(engine.header.predicted.length));
     else if (engine.header.mapCameras === "none") this.tell(TEXTS.noMaps);
@@ -118,6 +123,7 @@ export class Ui {
       this.#hint.hidden = false;
       setTimeout(() => (this.#hint.hidden = true), HINT_MS);
     }
+    this.#idle.end();
     this.update();
   }
 
@@ -146,8 +152,7 @@ export class Ui {
       section: playback.section,
       isGrowing: engine.isGrowing,
     });
-    this.#psnr.hidden = engine.psnr === undefined;
-    if (engine.psnr !== undefined) this.#psnr.textContent = TEXTS.psnr(engine.psnr);
+    this.#legend.show(engine);
     if (!this.#stats.hidden) this.#stats.textContent = statistics(engine);
   }
 
@@ -158,16 +163,20 @@ export class Ui {
   }
 
   tell(text: string): void {
-    const close = button(TEXTS.dismiss, "×", () => (this.#notice.hidden = true));
-    this.#notice.replaceChildren(element("p", {}, text), close);
-    this.#notice.hidden = false;
+    this.#notice.tell(text);
+  }
+
+  /** Nothing can be shown. */
+  fail(text: string): void {
+    this.#notice.tell(text, button(TEXTS.openFile, TEXTS.openFile, () => this.openFile()));
+    this.#idle.end();
   }
 
   endSway(): void {
     this.#isTouched = true;
     this.#hint.hidden = true;
     this.looking.endSway();
-    this.#awake();
+    this.#idle.end();
   }
 
   togglePlay(): void {
@@ -212,7 +221,7 @@ export class Ui {
   markSection(mark: Mark): void {
     const engine = this.#engine;
     if (!engine?.isOpen) return;
-    engine.playback.section = this.#section.mark(mark, engine.timeOf(engine.frame), engine.timeOf(engine.count - 1));
+    engine.playback.section = this.#section.mark(mark, engine.timeOf(engine.shown.frame), engine.timeOf(engine.count - 1));
     this.update();
   }
 
@@ -267,12 +276,9 @@ export class Ui {
   async saveClip(): Promise<void> {
     const engine = this.#engine;
     if (!engine?.isOpen) return;
-    const { from, to } = engine.playback.section ?? { from: 0, to: engine.timeOf(engine.count - 1) };
     this.tell(TEXTS.recording);
-    await engine.seek(engine.frameAt(from));
-    engine.play();
-    await saveClip(this.#canvas, Math.max((to - from) / engine.playback.speed, 0.2), engine.header.name || "view");
-    this.#notice.hidden = true;
+    await saveLoop(engine, this.#canvas);
+    this.#notice.hide();
   }
 
   async copyLink(): Promise<void> {
@@ -305,6 +311,11 @@ export class Ui {
       copyLink: () => void this.copyLink(),
       openFile: () => this.openFile(),
       toggleFullscreen: () => this.toggleFullscreen(),
+      followTilt: async () => {
+        const isAllowed = await Tilt.ask();
+        if (!isAllowed) this.tell(TEXTS.tiltRefused);
+        return isAllowed;
+      },
       toggleHeadset: () => void this.toggleHeadset(),
       showHelp: () => this.showHelp(),
       peek: async (seconds: number) => this.#engine?.peek(seconds, PEEK_PX),
@@ -332,14 +343,5 @@ export class Ui {
     event.preventDefault();
     this.endSway();
     action();
-  }
-
-  #awake(): void {
-    this.#stage.classList.remove("idle");
-    clearTimeout(this.#idle);
-    this.#idle = setTimeout(() => {
-      const hasFocus = this.controls.bar.matches(":focus-within") && this.controls.bar.querySelector(":focus-visible") !== null;
-      if (!hasFocus && this.controls.menu.hidden && !this.controls.bar.matches(":hover")) this.#stage.classList.add("idle");
-    }, IDLE_MS);
   }
 }
