@@ -21,8 +21,8 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def page(browser: Browser) -> Iterator[Page]:
-    """A page whose errors fail the test, and whose requests must stay on this machine."""
-    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    """A page whose errors fail the test, and whose requests must stay on this machine. Nothing sways."""
+    page = browser.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="reduce")
     troubles: list[str] = []
     page.on("pageerror", lambda error: troubles.append(str(error)))
     page.on("request", lambda request: troubles.append(request.url) if is_foreign(request.url) else None)

@@ -35,16 +35,11 @@ pytest_plugins = ("browser_fixtures",)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 
 STILL_MS = 1000  # several frames at half speed
-LOOK_KEYS = {
-    "d": "disparity",
-    "y": "layers",
-    "p": "provenance",
-    "x": "difference",
-    "a": "anaglyph",
-    "s": "side-by-side",
-    "n": "mosaic",
-    "v": "picture",
+LOOKS_BY_KEY = {
+    "v": ("disparity", "layers", "provenance", "difference", "picture"),
+    "e": ("anaglyph", "side-by-side", "mosaic", "picture"),
 }
+"""What each press of a key shows."""
 
 
 def test_loads_and_shows_the_middle(page: Page, server: Running, file: Path) -> None:
@@ -89,7 +84,7 @@ def test_steps_exactly_one_frame(page: Page, server: Running, file: Path) -> Non
 
 def test_plays_loops_and_pauses(page: Page, server: Running) -> None:
     show(page, server)
-    page.keyboard.press("o")
+    page.keyboard.press("r")
     page.keyboard.press("-")  # slow enough for the waits below to see frames of each half
     page.keyboard.press(" ")
     page.wait_for_selector("#play[aria-pressed=true]", state="attached")
@@ -104,6 +99,38 @@ def test_plays_loops_and_pauses(page: Page, server: Running) -> None:
     page.keyboard.press(" ")
     page.wait_for_selector("#play[aria-pressed=false]", state="attached")
     stands_still(page, STILL_MS)
+
+
+def test_what_lies_between_two_marks_is_played_over_and_over(page: Page, server: Running) -> None:
+    show(page, server, "#frame=3&view=1,1")
+    page.keyboard.press("a")
+    page.locator("#timeline").fill("5")
+    shows(page, frame=5)
+    page.keyboard.press("b")
+    page.wait_for_selector("#section", state="visible")
+    page.evaluate("""() => {
+        window.seen = [];
+        const note = () => window.seen.push(Number(document.body.dataset.frame));
+        new MutationObserver(note).observe(document.body, { attributeFilter: ["data-frame"] });
+    }""")
+    page.keyboard.press(" ")
+    page.wait_for_function("() => window.seen.length > 5")
+    page.keyboard.press(" ")
+    assert set(page.evaluate("window.seen")) <= {3, 4, 5}
+
+
+def test_it_sways_until_somebody_touches_it_and_has_the_colours_of_the_system(
+    browser: Browser, server: Running
+) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 720}, color_scheme="light")
+    show(page, server)
+    page.wait_for_function("() => Number(document.body.dataset.col) > 1.05")
+    dark = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    page.emulate_media(color_scheme="dark")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") != dark
+    page.keyboard.press(".")
+    stands_still(page, STILL_MS)
+    page.close()
 
 
 def test_it_says_how_to_look_around_and_a_click_plays(page: Page, server: Running) -> None:
@@ -164,10 +191,15 @@ def test_moves_by_keys_and_on_the_map(page: Page, server: Running) -> None:
     assert page.get_attribute("#map", "aria-valuetext") == "row 2.00, column 2.00"
 
 
-@pytest.mark.parametrize(("key", "look"), LOOK_KEYS.items())
-def test_every_look_has_a_key(page: Page, server: Running, key: str, look: str) -> None:
-    assert set(LOOK_KEYS.values()) == set(LOOKS)
-    show(page, server, "#look=disparity" if look == "picture" else "")
+@pytest.mark.parametrize("key", LOOKS_BY_KEY)
+def test_a_key_shows_one_look_after_the_other(page: Page, server: Running, key: str) -> None:
+    assert {look for looks in LOOKS_BY_KEY.values() for look in looks} == set(LOOKS)
+    show(page, server)
+    for look in LOOKS_BY_KEY[key]:
+        shows_another_look(page, key, look)
+
+
+def shows_another_look(page: Page, key: str, look: str) -> None:
     before = pixels(page)
     page.keyboard.press(key)
     shows(page, look=look)
@@ -202,7 +234,7 @@ def test_a_link_shows_the_same_picture(page: Page, browser: Browser, server: Run
     page.keyboard.press("ArrowRight")
     shows(page, frame=8, col=1.5)
     page.wait_for_url("**#frame=8&view=0.5,1.5&look=anaglyph&eyes=0.3")
-    other = browser.new_page(viewport={"width": 1280, "height": 720})
+    other = browser.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="reduce")
     other.goto(page.url)
     shows(other, frame=8, row=0.5, col=1.5, look="anaglyph")
     np.testing.assert_array_equal(pixels(other), pixels(page))

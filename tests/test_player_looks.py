@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -76,15 +78,23 @@ def test_provenance_counts_cameras() -> None:
     assert [item["share"] for item in legend["items"]] == pytest.approx([0.2] * 5, abs=0.01)
 
 
-def test_difference_is_from_the_nearest_real_camera() -> None:
-    assert overlays.nearest_camera(ARRAY, Viewpoint(1.9, 3.1)) == (2, 4)
-    assert overlays.nearest_camera(ARRAY, Viewpoint(0.4, 0.9)) == (0, 0)
-    decoded, view = rendered(Viewpoint(0, 2))
-    assert not overlays.difference(decoded, [view])[0].any()
-    other = RenderedView(
-        Viewpoint(0, 2), np.bitwise_xor(view.pixels, np.uint8(4)), view.disparity_px, view.seen_by
-    )
-    assert (overlays.difference(decoded, [other])[0] == 4 * overlays.DIFFERENCE_GAIN).all()
+def test_difference_is_to_the_original_in_levels() -> None:
+    _, view = rendered(Viewpoint(0, 2))
+    assert not overlays.difference(view, view.pixels)[0].any()
+    original = np.bitwise_xor(view.pixels, np.uint8(4))
+    assert (overlays.difference(view, original)[0] == 4 * overlays.DIFFERENCE_GAIN).all()
+
+
+def test_disagreement_is_how_much_the_warped_cameras_differ() -> None:
+    decoded, view = rendered()
+    same, legend = overlays.disagreement(decoded, [view])
+    assert "Disagreement" in legend["text"]
+    camera = decoded.array.real[0]
+    brighter = np.minimum(decoded.pictures[camera].astype(int) + 20, 255).astype(np.uint8)
+    pictures = {**decoded.pictures, camera: brighter}
+    spoiled, _ = overlays.disagreement(replace(decoded, pictures=pictures), [view])
+    assert np.median(same) < 20
+    assert np.median(spoiled) > 50
 
 
 @given(st.floats(0, 2), st.floats(0, 4), st.floats(0, 9))

@@ -29,19 +29,15 @@ pytest_plugins = ("browser_fixtures",)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 
 
-def test_help_and_hidden_controls(page: Page, server: Running) -> None:
+def test_help_and_full_screen(page: Page, server: Running) -> None:
     show(page, server)
     page.keyboard.press("?")
     page.wait_for_selector("#help[open]")
-    for text in ("one frame on", "disparity", "full screen", "nine views"):
+    for text in ("one frame back, on", "what is shown", "full screen", "nine views"):
         assert text in page.inner_text("#help")
     screenshot(page, "help")
     page.keyboard.press("Escape")
     page.wait_for_selector("#help:not([open])", state="attached")
-    page.keyboard.press("h")
-    assert not page.is_visible("#controls")
-    assert page.is_visible("#readout")
-    page.keyboard.press("h")
     page.keyboard.press("f")
     page.wait_for_selector("#fullscreen[aria-pressed=true]")
 
@@ -51,7 +47,7 @@ def test_keys_before_the_server_has_spoken_do_nothing(page: Page, server: Runnin
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.route_web_socket("**/view", lambda _: None)  # accepted, and silent
     page.goto(server.url)
-    for key in ("ArrowLeft", "g", "]", "+", "s", "Home", " ", "m"):
+    for key in ("ArrowLeft", "g", "]", "+", "a", "e", "v", "p", "Home", " ", "m"):
         page.keyboard.press(key)
     assert page.is_hidden("#notice")
     page.keyboard.press("?")
@@ -86,7 +82,7 @@ def test_two_viewers_watch_their_own_pictures(
     page: Page, browser: Browser, server: Running, file: Path
 ) -> None:
     show(page, server, "#frame=2&view=0,0")
-    other = browser.new_page(viewport={"width": 1280, "height": 720})
+    other = browser.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="reduce")
     show(other, server, "#frame=9&view=2,1.5")
     other.keyboard.press(",")
     shows(other, frame=8)

@@ -152,6 +152,20 @@ def test_playback_ends_or_loops_at_the_last_frame() -> None:
     assert session.state["playing"]
 
 
+def test_a_section_is_played_over_and_over_and_ends_with_the_whole_file() -> None:
+    clock = PlayClock(10, FPS)
+    clock.set_section(3, 5)
+    clock.seek(4, 0.0)
+    clock.play(True, 0.0)
+    assert [clock.advance(0.1 * k) for k in range(1, 6)] == [5, 3, 4, 5, 3]
+    assert clock.following(4, 5) == (5, 3, 4)
+    clock.set_section(0, 9)
+    assert clock.section is None
+    assert [clock.advance(0.1 * k) for k in range(6, 9)] == [4, 5, 6]
+    clock.set_section(7, 7)
+    assert clock.section is None, "one frame alone is no loop"
+
+
 def test_speed_multiplies_the_rate() -> None:
     session = ready(Speed(0.5), Play(True))
     assert request(session, 0.19).frame == 0

@@ -27,6 +27,7 @@ class PlayClock:
         self._dropped = 0
         self._stride = 1
         self.loop = False
+        self._section: tuple[int, int] | None = None
         self._speed = 1.0
 
     @property
@@ -45,17 +46,28 @@ class PlayClock:
         return self._dropped
 
     @property
+    def section(self) -> tuple[int, int] | None:
+        """First and last frame of what is played over and over; None: everything, or nothing."""
+        return self._section
+
+    def set_section(self, first: int, last: int) -> None:
+        """Play these frames over and over; all frames of the file mean none in particular."""
+        first, last = max(first, 0), min(last, self._count - 1)
+        self._section = (first, last) if first < last and (first, last) != (0, self._count - 1) else None
+
+    @property
     def speed(self) -> float:
         """Multiple of the file's frame rate."""
         return self._speed
 
     def play(self, playing: bool, now_s: float) -> None:
         """Start or stop. At the last frame, starting begins again from the first."""
+        first, last = self._ends
         if not playing:
             self._since_s = None
         elif not self.playing:
-            if self._frame == self._count - 1:
-                self._frame = 0
+            if self._frame == last:
+                self._frame = first
             self._since_s = now_s
 
     def set_speed(self, speed: float, now_s: float) -> None:
@@ -84,12 +96,25 @@ class PlayClock:
         self._stride = steps
         self._since_s = now_s if steps < due else self._since_s + due / rate
         last = self._count - 1
-        if self._frame + steps > last and not self.loop:
+        if self._frame + steps > last and not self._goes_round:
             steps = last - self._frame
             self._since_s = None
         self._dropped += max(steps - 1, 0)
-        self._frame = (self._frame + steps) % self._count
+        self._frame = self._round(self._frame + steps)
         return self._frame
+
+    @property
+    def _ends(self) -> tuple[int, int]:
+        return self._section or (0, self._count - 1)
+
+    @property
+    def _goes_round(self) -> bool:
+        return self.loop or self._section is not None
+
+    def _round(self, frame: int) -> int:
+        """The frame that comes in place of one behind the last."""
+        first, last = self._ends
+        return frame if frame <= last else first + (frame - first) % (last - first + 1)
 
     def following(self, frame: int, ahead: int) -> tuple[int, ...]:
         """The frame that will be due after this one, if as many are dropped as last, and those behind it.
@@ -97,8 +122,9 @@ class PlayClock:
         Args:
             ahead: how many at most; fewer before the end.
         """
-        if self.loop:
-            return tuple((frame + self._stride + i) % self._count for i in range(min(ahead, self._count)))
+        if self._goes_round:
+            first, last = self._ends
+            return tuple(self._round(frame + self._stride + i) for i in range(min(ahead, last - first + 1)))
         first = min(frame + self._stride, self._count - 1)
         return tuple(range(first, min(first + ahead, self._count))) if frame + 1 < self._count else ()
 

@@ -74,7 +74,7 @@ LOOKS: dict[str, Look] = {
     "disparity": Look(_one, overlays.disparity),
     "layers": Look(_one, overlays.layers),
     "provenance": Look(_one, overlays.provenance),
-    "difference": Look(_one, overlays.difference),
+    "difference": Look(_one, overlays.disagreement),
     "anaglyph": Look(stereoscopic.two_eyes, _anaglyph, stereo=True),
     "side-by-side": Look(stereoscopic.two_eyes, _side_by_side, stereo=True),
     "mosaic": Look(stereoscopic.nine_places, _mosaic, stereo=True),

@@ -67,6 +67,14 @@ class Loop:
 
 
 @dataclass(frozen=True, slots=True)
+class Section:
+    """Play from one frame to another over and over; the whole file ends that."""
+
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, slots=True)
 class Show:
     """Show one of LOOKS."""
 
@@ -94,7 +102,7 @@ class Shown:
     picture: int
 
 
-Message = Ready | Move | Seek | Step | Play | Speed | Loop | Show | Eyes | Measure | Shown
+Message = Ready | Move | Seek | Step | Play | Speed | Loop | Section | Show | Eyes | Measure | Shown
 
 
 def parse_message(text: str | bytes) -> Message:
@@ -173,6 +181,7 @@ _FORMS: dict[str, tuple[dict[str, _Check], Callable[..., Message]]] = {
     "play": ({"playing": _truth}, Play),
     "speed": ({"factor": _speed}, Speed),
     "loop": ({"loop": _truth}, Loop),
+    "section": ({"first": _whole, "last": _whole}, Section),
     "show": ({"look": _look}, Show),
     "eyes": ({"steps": _number}, Eyes),
     "measure": ({"measure": _truth}, Measure),

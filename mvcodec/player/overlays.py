@@ -7,6 +7,7 @@ A legend is ``{"kind": "scale", "text", "low", "high", "colours"}``, ``{"kind": 
 from __future__ import annotations
 
 import colorsys
+import math
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
@@ -15,11 +16,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.frames import DecodedSet, DisparityMap, Picture, RenderedView
 from mvcodec.layers.dils_split import split_levels
+from mvcodec.synthesis.cell_cameras import find_cameras
 
 DIFFERENCE_GAIN = 4
+DISAGREEMENT_GAIN = 12
+SPREAD = 0.4
+"""Squared cells; see `find_cameras`."""
+
+SAME_SURFACE_PX = 1.5
 SCALE_COLOURS = 17
 MAX_LEGEND_ITEMS = 9
 TINT = 0.62
@@ -76,26 +82,43 @@ def provenance(decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Pict
     return _tinted(view.pixels, seen, colours), legend
 
 
-def difference(decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, dict[str, Any]]:
-    """The largest difference of the three channels from the nearest real camera's picture."""
+def difference(view: RenderedView, original: Picture) -> tuple[Picture, dict[str, Any]]:
+    """The largest difference of the three channels from what a camera saw from there; of the same size."""
+    error = cv2.absdiff(view.pixels, original).max(axis=2)
+    return _grey(error, DIFFERENCE_GAIN, "Difference to the original, levels")
+
+
+def disagreement(decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, dict[str, Any]]:
+    """How much the cameras that see a point differ there: the deviation of their luma, warped to the view."""
     view = views[0]
-    camera = nearest_camera(decoded.array, view.viewpoint)
-    error = cv2.absdiff(view.pixels, decoded.pictures[camera]).max(axis=2)
-    grey = cv2.convertScaleAbs(error, alpha=DIFFERENCE_GAIN)
+    near = find_cameras(decoded, view.viewpoint, SPREAD)
+    rows, cols = np.indices(view.disparity_px.shape, np.float32)
+    total, mean, squares = (np.zeros(view.disparity_px.shape, np.float32) for _ in range(3))
+    for camera, shift, weight in zip(near.cameras, near.shifts, near.weights, strict=True):
+        x, y = cols + shift[0] * view.disparity_px, rows + shift[1] * view.disparity_px
+        luma = cv2.cvtColor(decoded.pictures[camera], cv2.COLOR_RGB2GRAY).astype(np.float32)
+        warped = cv2.remap(luma, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        surface = cv2.remap(
+            decoded.disparities[camera].values_px, x, y, cv2.INTER_NEAREST, borderValue=math.inf
+        )
+        share = np.where(np.abs(surface - view.disparity_px) <= SAME_SURFACE_PX, weight, np.float32(0))
+        total += share
+        mean += share * warped
+        squares += share * warped**2
+    known = np.maximum(total, np.float32(1e-6))
+    deviation = np.sqrt(np.maximum(squares / known - (mean / known) ** 2, 0))
+    return _grey(deviation, DISAGREEMENT_GAIN, "Disagreement of the cameras that see a point, levels")
+
+
+def _grey(levels: NDArray[Any], gain: int, text: str) -> tuple[Picture, dict[str, Any]]:
+    grey = cv2.convertScaleAbs(levels, alpha=gain)
     return np.repeat(grey[..., None], 3, axis=2), {
         "kind": "scale",
-        "text": f"Difference from the real camera at {camera[0]}, {camera[1]}, levels",
+        "text": text,
         "low": 0,
-        "high": 255 // DIFFERENCE_GAIN,
+        "high": 255 // gain,
         "colours": ["#000000", "#ffffff"],
     }
-
-
-def nearest_camera(array: CameraArray, viewpoint: Viewpoint) -> Position:
-    """The real camera at the smallest distance, in steps of the grid; the upper left one of equals."""
-    return min(
-        array.real, key=lambda camera: (camera[0] - viewpoint.row) ** 2 + (camera[1] - viewpoint.col) ** 2
-    )
 
 
 @cache

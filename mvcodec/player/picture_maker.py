@@ -18,6 +18,7 @@ from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.decoding.frame_store import Damage, FrameStore, StoredFrame
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
+from mvcodec.player import overlays
 from mvcodec.player.draft import QUICKER, SMALLER, Level, in_full_px, shrink
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.originals import Originals
@@ -110,9 +111,12 @@ class PictureMaker:
         viewpoints = self._viewpoints(request)
         views = self._render(decoded, viewpoints, request.level)
         rendered = time.perf_counter()
-        picture, legend = look.compose(
-            replace(decoded, disparity_range_px=stored.decoded.disparity_range_px), views
-        )
+        original = self._original(request, decoded)
+        if original is None:
+            shown = replace(decoded, disparity_range_px=stored.decoded.disparity_range_px)
+            picture, legend = look.compose(shown, views)
+        else:
+            picture, legend = overlays.difference(views[0], original)
         jpeg = to_jpeg(picture)
         done = time.perf_counter()
         facts = {
@@ -193,6 +197,13 @@ class PictureMaker:
         if self.originals is None or not request.measure or len(views) != 1:
             return None
         return asdict(self.originals.measure(decoded, views[0]))
+
+    def _original(self, request: PictureRequest, decoded: DecodedSet) -> Picture | None:
+        """What the look `difference` compares with; None where there is nothing."""
+        place = request.viewpoint.position
+        if request.look != "difference" or self.originals is None or place is None:
+            return None
+        return self.originals.picture(decoded.index, place)
 
     def _describe(self, damage: Damage) -> dict[str, Any]:
         times, goes_on = self.store.table.times_ns, damage.end < self.store.table.count

@@ -24,6 +24,7 @@ from mvcodec.player.messages import (
     Move,
     Play,
     Ready,
+    Section,
     Seek,
     Show,
     Shown,
@@ -111,7 +112,7 @@ class Session:
     def state(self) -> dict[str, Any]:
         """What the page must know of playback, as plain JSON values."""
         clock = self._clock
-        return {"playing": clock.playing, "speed": clock.speed, "loop": clock.loop}
+        return {"playing": clock.playing, "speed": clock.speed, "loop": clock.loop, "section": clock.section}
 
     @property
     def dropped(self) -> int:
@@ -139,6 +140,8 @@ class Session:
                 clock.set_speed(factor, now_s)
             case Loop(loop):
                 clock.loop = loop
+            case Section(first, last):
+                clock.set_section(first, last)
             case Show(look):
                 self._wanted = replace(self._wanted, look=look)
             case Eyes(steps):
@@ -154,8 +157,9 @@ class Session:
             return None
         eye_steps = self._eye_steps if LOOKS[self._wanted.look].stereo else 0.0
         request = replace(self._wanted, frame=self._clock.advance(now_s), eye_steps=eye_steps)
-        # A picture that stands, or that is measured, is never a draft.
-        if (self._clock.playing or self._moving(now_s)) and not request.measure:
+        # A picture that stands, or that is measured or compared, is never a draft.
+        is_exact = request.measure or request.look == "difference"
+        if (self._clock.playing or self._moving(now_s)) and not is_exact:
             request = replace(request, level=self._pace.level)
         if self._clock.playing and self._keeps_up and not self._moving(now_s):
             request = replace(request, enhanced=Enhanced.FROM_KEYFRAMES)

@@ -3,42 +3,35 @@
 const ARROWS = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0] };
 
 export function keyTable(player) {
-  const look = (name) => () => player.toggleLook(name);
   return [
-    { keys: [" ", "k"], names: ["Space", "k"], text: "play or pause", run: () => player.togglePlay() },
-    { keys: [","], text: "one frame back", run: () => player.step(-1) },
-    { keys: ["."], text: "one frame on", run: () => player.step(1) },
+    { keys: [" ", "k"], names: ["Space", "k"], text: "play, pause", run: () => player.togglePlay() },
+    { keys: [",", "."], text: "one frame back, on", run: (event) => player.step(event.key === "," ? -1 : 1) },
     { keys: ["j", "l"], text: "some seconds back, on", run: (event) => player.skip(event.key === "j" ? -1 : 1) },
-    { keys: ["Home"], text: "first frame", run: () => player.seek(0) },
-    { keys: ["End"], text: "last frame", run: () => player.seek(Infinity) },
+    { keys: ["Home", "End"], text: "first frame, last frame", run: (event) => player.seek(event.key === "Home" ? 0 : Infinity) },
     {
       keys: ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"],
       names: ["←", "→", "↑", "↓"],
-      text: "move the viewpoint (Shift: a whole step)",
+      text: "look around (Shift: a whole step)",
       run: (event) => player.nudge(...ARROWS[event.key].map((steps) => steps * (event.shiftKey ? 4 : 1))),
     },
-    { keys: ["g"], text: "to the nearest place of the grid", run: () => player.snap() },
-    { keys: ["o"], text: "loop", run: () => player.toggleLoop() },
+    { keys: ["g"], text: "to the nearest place of the array", run: () => player.snap() },
     { keys: ["-", "+"], text: "slower, faster", run: (event) => player.changeSpeed(event.key === "-" ? -1 : 1) },
-    { keys: ["v"], text: "plain picture", run: look("picture") },
-    { keys: ["d"], text: "disparity", run: look("disparity") },
-    { keys: ["y"], text: "depth layers", run: look("layers") },
-    { keys: ["p"], text: "provenance: seen by how many cameras", run: look("provenance") },
-    { keys: ["x"], text: "difference from the nearest real view", run: look("difference") },
-    { keys: ["m"], text: "PSNR and SSIM against the original", run: () => player.toggleMeasure() },
-    { keys: ["a"], text: "anaglyph, for red-cyan glasses", run: look("anaglyph") },
-    { keys: ["s"], text: "two eyes side by side", run: look("side-by-side") },
-    { keys: ["n"], text: "nine views", run: look("mosaic") },
+    { keys: ["a", "b"], text: "loop from here, to here; again: off", run: (event) => player.mark(event.key === "a" ? 0 : 1) },
+    { keys: ["r"], text: "begin again at the end, or not", run: () => player.toggleLoop() },
+    { keys: ["v"], text: "what is shown", run: () => player.nextLook() },
+    { keys: ["e"], text: "one view, red-cyan, side by side, nine views", run: () => player.nextEyes() },
     { keys: ["[", "]"], text: "eyes nearer, farther apart", run: (event) => player.changeEyes(event.key === "[" ? -1 : 1) },
+    { keys: ["m"], text: "PSNR and SSIM against the original", run: () => player.toggleMeasure() },
+    { keys: ["p"], text: "save the picture", run: () => player.savePicture() },
+    { keys: ["c"], text: "copy a link to this view and time", run: () => player.copyLink() },
     { keys: ["f"], early: true, text: "full screen", run: () => player.toggleFullscreen() },
     { keys: ["i"], early: true, text: "statistics", run: () => player.toggleStatistics() },
-    { keys: ["h"], early: true, text: "hide the controls", run: () => player.toggleControls() },
-    { keys: ["?"], early: true, text: "these keys", run: () => player.toggleHelp() },
+    { keys: ["?"], early: true, text: "this list", run: () => player.toggleHelp() },
   ];
 }
 
-// `ready()`: whether the server has said what there is to see; until then only keys marked `early` answer.
-export function listenForKeys(table, help, ready) {
+// `ready()`: whether the server has said what there is to see; until then only keys marked `early` answer. `touched()` comes before each.
+export function listenForKeys(table, help, ready, touched) {
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (help.open && event.key !== "?") return;
@@ -47,6 +40,7 @@ export function listenForKeys(table, help, ready) {
     const found = table.find(({ keys }) => keys.includes(key === "=" ? "+" : key));
     if (!found || !(found.early || ready())) return;
     event.preventDefault();
+    touched();
     found.run(event);
   });
 }

@@ -1,12 +1,15 @@
 // The player: what the viewer wants, what the server shows, and the controls between the two.
 
 import { Connection } from "./connection.js";
-import { keyTable, listenForKeys, writeHelp } from "./keys.js";
+import { Controls, LOOKS, STEREO } from "./controls.js";
+import { copyLink, savePicture } from "./keep.js";
 import { drawLegend } from "./legend.js";
 import { Link, readLink } from "./link.js";
 import { ArrayMap } from "./map.js";
+import { Section } from "./section.js";
 import { Stage } from "./stage.js";
 import { Stats } from "./stats.js";
+import { Sway } from "./sway.js";
 
 const NUDGE = 0.25; // steps of the grid
 const EYES_STEP = 0.05;
@@ -15,18 +18,6 @@ const NOTICE_MS = 10000;
 const IDLE_MS = 3000;
 const HINT_MS = 4000;
 const SKIP_S = 5;
-
-const LOOKS = {
-  picture: "picture",
-  disparity: "disparity",
-  layers: "layers",
-  provenance: "provenance",
-  difference: "difference",
-  anaglyph: "anaglyph",
-  "side-by-side": "side by side",
-  mosaic: "nine views",
-};
-const STEREO = ["anaglyph", "side-by-side", "mosaic"];
 
 const $ = (id) => document.getElementById(id);
 // 0:07.3
@@ -40,10 +31,12 @@ class Player {
   constructor() {
     this.facts = null;
     this.wanted = { frame: 0, row: null, col: null, look: "picture", eyes: null, measure: false, ...readLink() };
-    this.playback = { playing: false, speed: 1, loop: false };
+    this.isViewGiven = this.wanted.row !== null;
+    this.playback = { playing: false, speed: 1, loop: false, section: null };
+    this.section = new Section();
+    this.sway = new Sway((row, col) => this.moveTo(row, col));
     this.shown = null;
     this.moveDue = false;
-    this.scrubbing = false;
     this.link = new Link();
     this.stats = new Stats($("stats"));
     this.map = new ArrayMap($("map"), (row, col) => this.moveTo(row, col));
@@ -54,8 +47,8 @@ class Player {
       doubleClicked: () => this.toggleFullscreen(),
     });
     this.drawing = Promise.resolve();
+    this.controls = new Controls(this);
     this.connection = new Connection(this);
-    this.wire();
   }
 
   // What the server says
@@ -72,7 +65,7 @@ class Player {
     wanted.frame = clamp(wanted.frame, 0, facts.frames - 1);
     if (!facts.looks.includes(wanted.look)) wanted.look = "picture";
     this.map.build(facts);
-    this.fillControls();
+    this.controls.fill();
     const { send } = this;
     send("move", { row: wanted.row, col: wanted.col });
     send("seek", { frame: wanted.frame });
@@ -81,6 +74,8 @@ class Player {
     send("measure", { measure: wanted.measure });
     send("speed", { factor: this.playback.speed });
     send("loop", { loop: this.playback.loop });
+    const { section } = this.playback;
+    if (section) send("section", { first: section[0], last: section[1] });
     if (!first && this.playback.playing) send("play", { playing: true });
     send("ready");
     $("connection").hidden = true;
@@ -91,9 +86,9 @@ class Player {
 
   send = (type, fields) => this.connection.send(type, fields);
 
-  state({ playing, speed, loop }) {
-    this.playback = { playing, speed, loop };
-    this.showPlayback();
+  state({ playing, speed, loop, section }) {
+    this.playback = { playing, speed, loop, section };
+    this.controls.showPlayback();
   }
 
   trouble({ message }) {
@@ -178,6 +173,14 @@ class Player {
     this.send("seek", { frame: clamp(frame, 0, this.facts.frames - 1) });
   }
 
+  // The loop begins (0), or ends (1), at the frame that is shown.
+  mark(which) {
+    if (!this.facts || !this.shown) return;
+    const last = this.facts.frames - 1;
+    const section = this.section.mark(which, this.shown.frame, last) ?? [0, last];
+    this.send("section", { first: section[0], last: section[1] });
+  }
+
   toggleLoop() {
     this.send("loop", { loop: !this.playback.loop });
   }
@@ -191,15 +194,24 @@ class Player {
     this.setSpeed(SPEEDS[clamp(place + by, 0, SPEEDS.length - 1)]);
   }
 
-  toggleLook(look) {
-    this.setLook(this.wanted.look === look ? "picture" : look);
+  // What is shown of one view, or how many views.
+  nextLook() {
+    this.showNext(this.facts.looks.filter((look) => !STEREO.includes(look)));
+  }
+
+  nextEyes() {
+    this.showNext(["picture", ...STEREO]);
+  }
+
+  showNext(looks) {
+    this.setLook(looks[(looks.indexOf(this.wanted.look) + 1) % looks.length]);
   }
 
   setLook(look) {
     this.wanted.look = look;
     this.send("show", { look });
     this.say(LOOKS[look]);
-    this.showLook();
+    this.controls.showLook();
   }
 
   changeEyes(by) {
@@ -210,7 +222,7 @@ class Player {
     if (!this.facts) return;
     this.wanted.eyes = clamp(Math.round(steps / EYES_STEP) * EYES_STEP, 0, this.facts.cols - 1);
     this.send("eyes", { steps: this.wanted.eyes });
-    this.showLook();
+    this.controls.showLook();
   }
 
   toggleMeasure() {
@@ -232,8 +244,12 @@ class Player {
     $("stats").hidden = !$("stats").hidden;
   }
 
-  toggleControls() {
-    document.body.classList.toggle("bare");
+  savePicture() {
+    if (this.shown) savePicture(this.stage.canvas, `${this.facts.title.replace(/\.mcap$/, "")}-${this.shown.frame}`);
+  }
+
+  copyLink() {
+    copyLink(this.link.wanted, (text) => this.warn(text));
   }
 
   toggleHelp() {
@@ -252,52 +268,18 @@ class Player {
 
   // What is on the screen
 
-  fillControls() {
-    const { facts } = this;
-    $("timeline").max = facts.frames - 1;
-    $("look").replaceChildren(...facts.looks.map((look) => new Option(LOOKS[look] ?? look, look)));
-    $("eyes").max = facts.cols - 1;
-    $("eyes").disabled = facts.cols === 1;
-    $("measure").hidden = !facts.measurable;
-    $("measure").setAttribute("aria-pressed", this.wanted.measure);
-    this.showLook();
-    this.showPlayback();
-  }
-
-  showLook() {
-    const { look, eyes } = this.wanted;
-    $("look").value = look;
-    $("eyes-box").hidden = !STEREO.includes(look);
-    $("eyes").value = eyes;
-    $("eyes-value").textContent = eyes.toFixed(2);
-  }
-
-  showPlayback() {
-    const { playing, speed, loop } = this.playback;
-    this.stir();
-    if (playing) $("big").hidden = true;
-    const button = $("play");
-    button.setAttribute("aria-pressed", playing);
-    button.setAttribute("aria-label", playing ? "Pause" : "Play");
-    button.title = playing ? "Pause (space)" : "Play (space)";
-    $("loop").setAttribute("aria-pressed", loop);
-    $("speed").value = String(speed);
-  }
-
   showFacts() {
     const { facts, shown, wanted } = this;
     wanted.frame = shown.frame;
     if (!$("wait").hidden) this.firstShown();
     // The last frame is shown until the end.
     const time = `${clock(shown.time_s - facts.first_s)} / ${clock(facts.last_s - facts.first_s + 1 / facts.fps)}`;
-    $("time").textContent = time;
-    if (!this.scrubbing) $("timeline").value = shown.frame;
-    $("timeline").setAttribute("aria-valuetext", time);
+    this.controls.showTime(time, shown.frame);
     this.map.show(shown, wanted);
     drawLegend($("legend"), shown.legend);
     this.showQuality(shown.quality);
     this.showDamage(shown);
-    this.link.write({ ...shown, eyes: wanted.eyes }, STEREO.includes(shown.look));
+    if (!this.sway.isOn) this.link.write({ ...shown, eyes: wanted.eyes }, STEREO.includes(shown.look));
     const { look, frame, row, col, scale, quick } = shown;
     Object.assign(document.body.dataset, { look, frame, row, col, scale, quick });
   }
@@ -306,13 +288,16 @@ class Player {
     $("wait").hidden = true;
     $("big").hidden = this.facts.frames < 2 || this.playback.playing;
     if (this.isTouched || this.facts.rows * this.facts.cols < 2) return;
+    const isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (!isStill && !this.isViewGiven) this.sway.begin(this.facts);
     $("hint").hidden = false;
     setTimeout(() => ($("hint").hidden = true), HINT_MS);
   }
 
-  // Somebody takes over: no more hint.
+  // Somebody takes over: no more hint, and no sway.
   touched() {
     this.isTouched = true;
+    this.sway.end();
     $("hint").hidden = true;
   }
 
@@ -348,41 +333,6 @@ class Player {
     $("spoken").textContent = text;
   }
 
-  wire() {
-    const click = (id, action) => $(id).addEventListener("click", action);
-    click("play", () => this.togglePlay());
-    click("big", () => this.togglePlay());
-    click("back", () => this.step(-1));
-    click("on", () => this.step(1));
-    click("loop", () => this.toggleLoop());
-    click("measure", () => this.toggleMeasure());
-    click("open-help", () => this.toggleHelp());
-    click("fullscreen", () => this.toggleFullscreen());
-    click("notice-close", () => ($("notice").hidden = true));
-    // After the mouse, the keys belong to the picture again; whoever came by Tab stays there.
-    for (const button of document.querySelectorAll("main button")) {
-      button.addEventListener("click", (event) => {
-        this.touched();
-        if (event.detail) $("stage").focus();
-      });
-    }
-    $("speed").addEventListener("change", () => this.setSpeed(Number($("speed").value)));
-    $("look").addEventListener("change", () => this.setLook($("look").value));
-    $("eyes").addEventListener("input", () => this.setEyes(Number($("eyes").value)));
-    $("timeline").addEventListener("input", () => {
-      this.scrubbing = true;
-      this.seek(Number($("timeline").value));
-    });
-    $("timeline").addEventListener("change", () => (this.scrubbing = false));
-    document.addEventListener("fullscreenchange", () => $("fullscreen").setAttribute("aria-pressed", Boolean(document.fullscreenElement)));
-    window.addEventListener("hashchange", () => this.followLink());
-    const table = keyTable(this);
-    listenForKeys(table, $("help"), () => this.facts !== null);
-    writeHelp($("keys"), table);
-    for (const sign of ["pointermove", "pointerdown", "keydown", "focusin"]) document.addEventListener(sign, () => this.stir());
-    const controls = $("controls");
-    new ResizeObserver(() => document.documentElement.style.setProperty("--controls", `${controls.offsetHeight}px`)).observe(controls);
-  }
 }
 
 new Player();

@@ -707,7 +707,7 @@ button svg { display: block; width: 16px; height: 16px; fill: none; stroke: curr
 .fills svg { fill: currentColor; }
 .track { position: relative; height: 26px; }
 .track input { width: 100%; height: 26px; margin: 0; accent-color: var(--accent); cursor: pointer; }
-.section { position: absolute; top: 9px; height: 8px; background: color-mix(in srgb, var(--accent) 40%, transparent); border-radius: 4px; pointer-events: none; }
+.section { position: absolute; top: 4px; height: 18px; border: solid var(--text); border-width: 0 3px; border-radius: 3px; pointer-events: none; }
 .peek { position: absolute; bottom: 30px; transform: translateX(-50%); padding: 4px; background: var(--panel); border-radius: 8px; text-align: center; pointer-events: none; font-variant-numeric: tabular-nums; }
 .peek canvas { display: block; border-radius: 5px; max-width: 160px; }
 .menu { position: absolute; right: 12px; bottom: 92px; display: grid; gap: 4px; padding: 10px; min-width: 190px; background: var(--panel); border: 1px solid var(--line); border-radius: 10px; backdrop-filter: blur(8px); max-height: calc(100% - 110px); overflow: auto; }
