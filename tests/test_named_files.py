@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from array_files import save
 from command_line import fails, succeeds
+from PIL import Image
 from timed_videos import SIZE, number_of, numbered, write_frames
 
 from mvcodec.capture import open_input
@@ -79,6 +80,19 @@ def test_single_pictures_are_views_of_one_frame_set(tmp_path: Path) -> None:
     assert [number_of(picture) for picture in item.pictures.values()] == [0, 1]
 
 
+@pytest.mark.parametrize("form", ["webp", "png", "tiff"])
+def test_of_an_animation_in_a_picture_file_the_first_picture_is_taken_and_that_is_told(
+    tmp_path: Path, form: str
+) -> None:
+    pictures = [Image.fromarray(numbered(number)) for number in (3, 4, 5)]
+    paths = [tmp_path / f"{name}.{form}" for name in "ab"]
+    for path in paths:
+        pictures[0].save(path, save_all=True, append_images=pictures[1:])
+    with pytest.warns(MvCodecWarning, match=r"a\.\w+: it holds 3 pictures: the first one is taken"):
+        (item,) = open_input(paths, grid=(1, 2)).frame_sets()
+    assert number_of(item.pictures[0, 0]) == 3
+
+
 @pytest.mark.parametrize(
     ("begin", "ones"), [((0, 0), ""), ((1, 0), "col"), ((0, 1), "frame"), ((1, 1), "col and frame")]
 )
@@ -104,6 +118,5 @@ def test_the_command_takes_files_apart_and_names_as_they_are(
     monkeypatch.chdir(tmp_path)
     options = ["--split", "1x2", "--qp", "40", "--preset", "ultrafast", "--json"]
     assert '"frames": 2' in succeeds("encode", "-a:b 5%d ü.mp4", "o.mcap", *options)
-    assert "--split: found with live cameras, expected no such option" in fails(
-        2, "encode", "udp://127.0.0.1:9", "x.mcap", "--split", "1x2"
-    )
+    live = ("udp://127.0.0.1:9", "udp://127.0.0.1:10", "x.mcap", "--grid", "1x2", "--split", "1x2")
+    assert "a grid of 2 cameras of 1x2 views each" in fails(2, "encode", *live)

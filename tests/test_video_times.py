@@ -119,6 +119,16 @@ def test_offsets_shift_a_camera_by_any_of_its_names(tmp_path: Path) -> None:
         opened(*paths, offsets_ms={"c": 1.0})
 
 
+def test_an_offset_of_a_virtual_view_is_refused_where_that_is_not_read(tmp_path: Path) -> None:
+    paths = [write_video(tmp_path / f"{name}.mp4", range(10)) for name in "abc"]
+    timing = Timing(offsets_ms={"b": 100.0})
+    assert open_input(paths, grid=(1, 3), timing=timing).frame_count == 7
+    with pytest.raises(
+        SettingError, match=r"found b \(a virtual view, not read\), expected a real one: r00_c00"
+    ):
+        open_input(paths, grid=(1, 3), timing=timing, originals=False)
+
+
 def test_cameras_without_a_common_time_are_refused(tmp_path: Path) -> None:
     paths = [
         write_video(tmp_path / "a.mkv", range(4), at_30([0, 1, 2, 3])),

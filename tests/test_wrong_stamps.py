@@ -89,14 +89,17 @@ def test_log_times_that_mean_nothing_change_nothing() -> None:
     assert times == [at(n * 300) for n in range(8)]
 
 
+@pytest.mark.parametrize("pipe", [False, True])
 @pytest.mark.parametrize(("fps", "rate"), [(None, 20.0), (25.0, 25.0)])
 def test_recordings_that_were_written_at_once_have_the_rate_of_their_stamps(
-    fps: float | None, rate: float
+    fps: float | None, rate: float, pipe: bool
 ) -> None:
     taken = [(TOPICS[c], raw(n, c), START_NS, START_NS + n * 50_000_000) for n in range(4) for c in (0, 1)]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        recording = Recording(io.BytesIO(written(taken)), "rec", RecordingSettings((TOPICS,), fps=fps))
+        file = Pipe(written(taken)) if pipe else io.BytesIO(written(taken))
+        settings = RecordingSettings((TOPICS,), fps=fps)
+        recording = Recording(cast("io.BytesIO", file), "rec", settings)
     assert recording.array.fps == rate
     told = "\n".join(str(warning.message) for warning in caught)
     assert ("written down at one time: 20 fps, by the first stamps" in told) == (fps is None)

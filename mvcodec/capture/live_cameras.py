@@ -7,17 +7,19 @@ import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain, pairwise
+from itertools import chain, pairwise, product
 from statistics import median
 
 from av.video.reformatter import VideoReformatter
 
 from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.capture.live_camera import LiveCamera, LivePicture
-from mvcodec.capture.live_clock import common_clock
+from mvcodec.capture.live_clock import SharedShifts
 from mvcodec.capture.pairing import NEAREST_SHARE
+from mvcodec.capture.reading import views_in_pictures
 from mvcodec.capture.recorded_calibration import RecordedCamera
 from mvcodec.capture.selection import real_cameras, select_real
+from mvcodec.capture.split import cut_out, view_size
 from mvcodec.capture.timing import nominal_fps, tolerance
 from mvcodec.capture.video_input import frame_to_rgb
 from mvcodec.container.recorded_pictures import Clock
@@ -38,7 +40,7 @@ class LiveSettings:
     """How live cameras are read.
 
     Attributes:
-        addresses: of all cameras of the grid, row by row.
+        addresses: of all cameras of the grid, or of every `split` views, row by row.
         grid: (rows, cols).
         real, fps, tolerance_ms, patience_s: explained by their fields.
         calibration: of all cameras; None: nominal.
@@ -64,11 +66,13 @@ class LiveSettings:
         low=0.001,
         high=86_400,
     )
+    split: tuple[int, int] = views_in_pictures((1, 1))
 
     def __post_init__(self) -> None:
-        rows, cols = self.grid
-        if len(self.addresses) != rows * cols:
-            raise SettingError("grid", f"{rows}x{cols}", f"a grid of {len(self.addresses)} cameras")
+        (rows, cols), (down, across) = self.grid, self.split
+        if len(self.addresses) * down * across != rows * cols or rows % down or cols % across:
+            each = f" of {down}x{across} views each" * (self.split != (1, 1))
+            raise SettingError("grid", f"{rows}x{cols}", f"a grid of {len(self.addresses)} cameras{each}")
         if len(set(self.addresses)) != len(self.addresses):
             raise SettingError("INPUT", "an address twice", "each camera once")
         check_settings(self)
@@ -97,18 +101,19 @@ class LiveCameras:
         self._settings = settings
         addresses = settings.addresses
         self.name = addresses[0] if len(addresses) == 1 else f"{addresses[0]} ... {addresses[-1]}"
-        rows, cols = settings.grid
-        self._axes = select_real(settings.real, rows, cols)
+        self._axes = select_real(settings.real, *settings.grid)
+        (down, across), cols = settings.split, settings.grid[1] // settings.split[1]
         self._changed = threading.Condition()
         self._cameras = {
             (row, col): LiveCamera(addresses[row * cols + col], self._changed, settings.patience_s)
-            for row in self._axes[0]
-            for col in self._axes[1]
+            for row in dict.fromkeys(row // down for row in self._axes[0])
+            for col in dict.fromkeys(col // across for col in self._axes[1])
         }
-        self._shifts: dict[Position, int] = {}
+        self._shifts = SharedShifts(settings.clock)
+        self._senders = {position: number for number, position in enumerate(self._cameras)}
         self._connections: dict[Position, int] = {}
         self._step_ns = 0
-        self._told = False
+        self._told = self._told_drift = False
         self._dropped = 0
         self._last_ns: int | None = None
         self._reformatter = VideoReformatter()
@@ -134,13 +139,22 @@ class LiveCameras:
     def frame_sets(self) -> Iterator[FrameSet]:
         """Frame sets as they come, numbered from 0, until nothing comes any more."""
         assert self._first is not None
-        size = (self.array.height, self.array.width, 3)
+        (down, across), real = self._settings.split, set(self.array.real)
+        width, height = self.array.width, self.array.height
+        size = (down * height, across * width, 3)
         for index, (time_ns, pictures) in enumerate(chain([self._first], self._sets)):
             for position, picture in pictures.items():
                 if picture.shape != size:
                     found = f"a picture of {picture.shape[1]}x{picture.shape[0]} px"
                     raise InputError(self._cameras[position].address, found, f"{size[1]}x{size[0]} px")
-            yield FrameSet(index, time_ns, pictures)
+            views = {
+                (row * down + inner_row, col * across + inner_col): cut_out(
+                    picture, inner_row, inner_col, (width, height)
+                )
+                for (row, col), picture in pictures.items()
+                for inner_row, inner_col in product(range(down), range(across))
+            }
+            yield FrameSet(index, time_ns, {place: views[place] for place in sorted(views) if place in real})
         left_out = sum(camera.left_out for camera in self._cameras.values())
         self._warn(f"nothing came for {self._settings.patience_s:g} s: taken as the end")
         if left_out or self._dropped:
@@ -169,6 +183,7 @@ class LiveCameras:
     def _make_array(self, pictures: Mapping[Position, Picture]) -> CameraArray:
         rows, cols = self._settings.grid
         height, width = next(iter(pictures.values())).shape[:2]
+        width, height = view_size((width, height), *self._settings.split, self.name)
         return CameraArray(
             rows=rows,
             cols=cols,
@@ -220,6 +235,7 @@ class LiveCameras:
         """Whether the clocks of all connections are known."""
         now = {position: camera.connection for position, camera in self._cameras.items()}
         if now == self._connections:
+            self._follow_clocks()
             return True
         for camera in self._cameras.values():
             if camera.clock.shift_ns is None or time.monotonic() - camera.clock.began_s < SETTLE_S:
@@ -239,20 +255,30 @@ class LiveCameras:
         return True
 
     def _set_shifts(self) -> None:
-        found = {p: camera.clock.shift_ns or 0 for p, camera in self._cameras.items()}
-        shared = common_clock(list(found.values()))
-        by_stamp = self._settings.clock == "stamp" or (self._settings.clock is None and shared)
-        common = min(found.values())
-        self._shifts = dict.fromkeys(found, common) if by_stamp else found
-        gap = max(found.values()) - common
+        found = [camera.clock.shift_ns or 0 for camera in self._cameras.values()]
+        self._shifts.begin(found)
+        gap = max(found) - min(found)
         if self._settings.clock is None and gap > 2 * self._step_ns and not self._told:
             self._told = True
-            how = "their stamps; `clock` log takes" if by_stamp else "arrival; `clock` stamp takes"
+            how = (
+                "their stamps; `clock` log takes" if self._shifts.by_stamp else "arrival; `clock` stamp takes"
+            )
             self._warn(
                 f"the clocks of its cameras are {gap / 1e9:.3f} s apart, by when pictures arrive: paired by"
                 f" {how} the other"
             )
 
+    def _follow_clocks(self) -> None:
+        self._shifts.follow([camera.clock.shift_ns or 0 for camera in self._cameras.values()])
+        drift = self._shifts.drift_ns()
+        if self._shifts.by_stamp and drift > self._step_ns and not self._told_drift:
+            self._told_drift = True
+            self._warn(
+                f"the clocks of its cameras went {drift / 1e6:.4g} ms apart since the start, by when pictures"
+                " arrive; `clock` log follows that"
+            )
+
     def _time(self, position: Position, picture: LivePicture) -> int:
         offset_ms = self._settings.offsets_ms.get(self._cameras[position].address, 0.0)
-        return picture.stamp_ns + self._shifts[position] + round(offset_ms * 1e6)
+        shift = self._shifts.of(self._senders[position])
+        return picture.stamp_ns + shift + round(offset_ms * 1e6)

@@ -6,6 +6,8 @@ import time
 from collections import deque
 from collections.abc import Sequence
 
+from mvcodec.container.recorded_pictures import Clock
+
 _WINDOW = 1000
 """Pictures after which an early arrival is forgotten, since the sender's clock runs at a speed of its own."""
 
@@ -50,6 +52,41 @@ class ArrivalClock:
         """What makes a time of day of a stamp; None before the first picture that counts."""
         known = [delay for delay in (self._now, self._before) if delay is not None]
         return min(known, default=None)
+
+
+class SharedShifts:
+    """What is added to the stamps of several senders so that they are on one clock.
+
+    Args:
+        clock: the senders' stamps, or arrival; None: stamps where they seem to be of one clock.
+
+    Attributes:
+        by_stamp: the senders' stamps count as they are, known after `begin`.
+    """
+
+    def __init__(self, clock: Clock | None) -> None:
+        self._clock, self.by_stamp = clock, False
+        self._now: list[int] = []
+        self._begun: list[int] = []
+
+    def begin(self, found_ns: Sequence[int]) -> None:
+        """Connections are new: `found_ns` is what arrivals say of each sender, ns."""
+        self.by_stamp = self._clock == "stamp" or (self._clock is None and common_clock(found_ns))
+        self._begun = list(found_ns)
+        self.follow(found_ns)
+
+    def follow(self, found_ns: Sequence[int]) -> None:
+        """Senders' clocks run at speeds of their own: arrivals say something else after a while."""
+        self._now = list(found_ns)
+
+    def of(self, sender: int) -> int:
+        """What is added to the stamps of a sender, ns."""
+        return min(self._begun) if self.by_stamp else self._now[sender]
+
+    def drift_ns(self) -> int:
+        """How far the senders' clocks went apart since the connections began."""
+        moved = [now - begun for now, begun in zip(self._now, self._begun, strict=True)]
+        return max(moved) - min(moved)
 
 
 def common_clock(shifts_ns: Sequence[int]) -> bool:

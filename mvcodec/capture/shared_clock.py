@@ -58,7 +58,7 @@ def common_times(
         SettingError: an offset for a camera that is not there.
         InputError: no frame rate, or no picture of all cameras at one time.
     """
-    offsets = _offsets_ns(views, timing)
+    offsets = _offsets_ns(views, timing, deciding)
     given = _checked(stated, views)
     views = {view: reader for view, reader in views.items() if view in deciding}
     given = {view: times for view, times in given.items() if view in deciding}
@@ -128,7 +128,9 @@ def _rate(
     return default_fps
 
 
-def _offsets_ns(views: Mapping[Position, ViewReader], timing: Timing) -> dict[Position, int]:
+def _offsets_ns(
+    views: Mapping[Position, ViewReader], timing: Timing, deciding: Collection[Position]
+) -> dict[Position, int]:
     found: dict[Position, int] = {}
     for camera, offset_ms in timing.offsets_ms.items():
         named = [view for view, reader in views.items() if camera in _names(view, reader)]
@@ -136,6 +138,11 @@ def _offsets_ns(views: Mapping[Position, ViewReader], timing: Timing) -> dict[Po
             choices = ", ".join(list(_labels(views).values())[:4])
             what = "no such camera" if not named else f"{len(named)} cameras of that name"
             raise SettingError("offsets_ms", f"{camera} ({what})", f"CAMERA=MS, CAMERA one of {choices} ...")
+        if named[0] not in deciding:
+            real = ", ".join(view_name(view) for view in sorted(deciding)[:4])
+            raise SettingError(
+                "offsets_ms", f"{camera} (a virtual view, not read)", f"a real one: {real} ..."
+            )
         found[named[0]] = round(offset_ms * 1e6)
     return found
 

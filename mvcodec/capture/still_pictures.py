@@ -48,12 +48,14 @@ class StillFacts:
         orientation: how it must be turned for that.
         alpha: it says how opaque its pixels are.
         bits: of a channel.
+        count: pictures in the file; the first one is read.
     """
 
     size: tuple[int, int]
     orientation: Orientation
     alpha: bool
     bits: int
+    count: int
 
 
 @contextmanager
@@ -85,7 +87,8 @@ def still_facts(picture: ImageFile.ImageFile) -> StillFacts:
     tag = None if picture.format in _TURNED_WHEN_READ else picture.getexif().get(ExifTags.Base.Orientation)
     orientation = exif_orientation(tag)
     alpha = picture.mode in _ALPHA_MODES or "transparency" in picture.info
-    return StillFacts(orientation.size(*picture.size), orientation, alpha, picture.info[_BITS])
+    count = getattr(picture, "n_frames", 1)
+    return StillFacts(orientation.size(*picture.size), orientation, alpha, picture.info[_BITS], count)
 
 
 def is_see_through(picture: ImageFile.ImageFile) -> bool:

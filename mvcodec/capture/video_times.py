@@ -44,6 +44,9 @@ _TELL_LOSSES = frozenset({"h264", "hevc", "av1"})
 _STATE_DURATIONS = frozenset({"gif", "apng", "webp"})
 """Codecs of animations, each of whose pictures says how long it stands: none is missing."""
 
+_STILL_BRAND = "avif"
+"""Of a file with a still picture, which a video's rules do not hold for."""
+
 _PLAIN = {"h264": "h264_mp4toannexb", "hevc": "hevc_mp4toannexb", "av1": "av1_metadata"}
 """Filters that bring packets into the form of streams: NAL units with start codes, OBUs with sizes."""
 
@@ -209,6 +212,8 @@ def _packets(
 ) -> Iterator[_Packet]:
     """The packets whose pictures are shown, in coding order."""
     name = stream.codec_context.codec.canonical_name
+    if container.metadata.get("major_brand") == _STILL_BRAND:
+        name = ""  # one picture, which nothing comes before
     whole = WholePictures(name)
     plain = BitStreamFilterContext(_PLAIN[name], stream) if name in _PLAIN else None
     started, first = False, None

@@ -78,7 +78,10 @@ class PictureView:
         self.early, self.fps = 0, 0.0
         facts = picture_facts(paths[0])
         self.size = facts.size
-        self.notes = ("how opaque its pixels are is left out",) if facts.alpha else ()
+        self.notes: tuple[str, ...] = ("how opaque its pixels are is left out",) if facts.alpha else ()
+        if facts.count > 1:
+            several = f"it holds {facts.count} pictures: the first one is taken; make a video of an animation"
+            self.notes += (several,)
         if facts.bits > 8:
             look_at_depth(paths[0], depth)
 

@@ -48,23 +48,25 @@ def live_cameras(arguments: argparse.Namespace) -> Iterator[LiveCameras]:
         SettingError: options that don't fit them.
         InputError: nothing comes.
     """
-    for option in ("topics", "depth_topics", "split", "bits", "gaps", "sync"):
+    for option in ("topics", "depth_topics", "bits", "gaps", "sync"):
         if getattr(arguments, option) is not None:
             raise SettingError(option, "with live cameras", "no such option")
     count = len(arguments.input)
     if arguments.grid is None and count > 1:
         raise SettingError("--grid", "nothing", f"RxC of {count} cameras in row order")
+    split = arguments.split or (1, 1)
     timing = timing_of(arguments)
     patience = {} if arguments.patience_s is None else {"patience_s": arguments.patience_s}
     settings = LiveSettings(
         addresses=tuple(arguments.input),
-        grid=arguments.grid or (1, 1),
+        grid=arguments.grid or split,
         real=arguments.real,
         fps=timing.fps,
         tolerance_ms=timing.tolerance_ms,
         calibration=None if arguments.calibration is None else read_calibration(arguments.calibration),
         clock=arguments.clock,
         offsets_ms=timing.offsets_ms,
+        split=split,
         **patience,
     )
     with closing(LiveCameras(settings)) as cameras:

@@ -75,7 +75,8 @@ class RecordingReader:
         rig: what was read about cameras; of files without index, up to the end of the chunk at hand.
             None: it is not wanted any more.
         notes: what is unusual about the files, one line each.
-        written_at_once: by the index all messages have one log time, which says nothing of a frame rate.
+        written_at_once: all messages (without an index: all so far) have one log time, which says nothing
+            of a frame rate.
 
     Raises (also while iterating):
         StreamError: not MCAP, damaged, or a topic holds something other than pictures.
@@ -96,7 +97,8 @@ class RecordingReader:
         self.rig: RecordedRig | None = RecordedRig()
         self.indexed = all(part.indexed for part in self._parts)
         self.notes: list[str] = []
-        self._by_time = self.written_at_once = False
+        self._by_time = self.written_at_once = self._log_moved = False
+        self._first_log: int | None = None
         self._times: dict[str, list[int]] = {}
         if self.indexed:
             self._check_topics({topic for part in self._parts for topic in part.topics})
@@ -118,10 +120,17 @@ class RecordingReader:
         for part in self._parts:
             messages = in_time_order(part, self._topics) if self._by_time else self._as_written(part)
             for topic, message in messages:
+                if not self.indexed:
+                    self._follow_log(message.log_time)
                 picture = self._picture(part, topic, message)
                 if picture is not None:
                     yield picture
         self._check_topics({topic for part in self._parts for topic in part.topics})
+
+    def _follow_log(self, log_ns: int) -> None:
+        self.written_at_once = self._first_log in (None, log_ns) and not self._log_moved
+        self._log_moved = not self.written_at_once
+        self._first_log = log_ns
 
     def _plan_order(self) -> None:
         count = 0
