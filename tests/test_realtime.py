@@ -33,6 +33,15 @@ def test_surfaces_are_found_at_every_size(shape: tuple[int, int], halvings: int)
         assert 0.5 < found.valid.mean() < 1
 
 
+@pytest.mark.parametrize("wanted", [[(0, 0)], [(0, 0), (0, 2)]], ids=str)
+def test_cameras_whose_neighbours_send_no_map_are_matched(wanted: list[Position]) -> None:
+    array = linear_or_grid(1, 3, 150, 101)
+    scene = Planes(array, 4, 16)
+    maps = Realtime().match_cameras(array, scene.pictures(), RANGE_PX, wanted, fresh=False)
+    assert list(maps) == wanted
+    assert max(bad_share(scene, camera, found) for camera, found in maps.items()) < 0.06
+
+
 def test_a_camera_is_matched_alone_as_among_others() -> None:
     array = linear_or_grid(2, 2, 120, 80)
     pictures = Planes(array, 4, 16).pictures()

@@ -237,7 +237,10 @@ class Joint:
         penalties = settings.completion_penalties
         others = [other for other in neighbours(array, camera) if other in raw]
         own = _parts(raw[camera])
-        behind = np.stack([np.where(valid[other], _parts(raw[other]), NOWHERE) for other in others])
+        # None, where a row's neighbours send no map: its surroundings alone decide.
+        behind = np.empty((len(others), *own.shape), own.dtype)
+        for other, out in zip(others, behind, strict=True):
+            out[:] = np.where(valid[other], _parts(raw[other]), NOWHERE)
         most = MAX_SUM - max(penalties.jump, penalties.least_jump) - penalties.small_step
 
         def costs_of(first: int, costs: NDArray[np.uint8]) -> None:

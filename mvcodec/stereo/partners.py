@@ -34,7 +34,8 @@ def neighbours(array: CameraArray, camera: Position) -> list[Position]:
 
 def steps(array: CameraArray, camera: Position, others: list[Position]) -> NDArray[np.float32]:
     """float32 (P, 2): what a pixel moves (left, up) for each px of disparity, from camera to each other."""
-    return np.array([array.shift_per_disparity(camera, Viewpoint(*other)) for other in others], np.float32)
+    shifts = [array.shift_per_disparity(camera, Viewpoint(*other)) for other in others]
+    return np.array(shifts, np.float32).reshape(-1, 2)
 
 
 def unseen_border(array: CameraArray, camera: Position, range_px: tuple[float, float]) -> Mask:
