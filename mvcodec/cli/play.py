@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``play``."""
     parser.add_argument("input", type=local_path, metavar="FILE.mcap", help="the file to watch")
     parser.add_argument(
-        "--original", type=local_path, metavar="ARRAY", help="array folder to measure the pictures against"
+        "--original", type=local_path, metavar="ARRAY", help="array folder to compare the pictures with"
     )
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=_port, default=0, help="0 takes any free one (default: 0)")

@@ -29,7 +29,8 @@ export class Engine {
   #supply: Supply | undefined;
   #renderer: ViewRenderer | undefined;
   #immersive: Immersive | undefined;
-  #originals: Originals | undefined;
+  /** What views can be compared with. */
+  originals: Originals | undefined;
   /** Luma PSNR of the picture that stands against its original, dB; undefined where they are not compared. */
   psnr: number | undefined;
   /** The newest frame of a live view. */
@@ -79,7 +80,7 @@ export class Engine {
     const { header } = recording;
     this.#renderer = new ViewRenderer(this.#canvas, header);
     const onCame = (trouble?: string) => (trouble === undefined ? undefined : tell(trouble), this.wake());
-    if (at.originals !== undefined) this.#originals = new Originals(at.originals, header, onCame);
+    if (at.originals !== undefined) this.originals = new Originals(at.originals, header, onCame);
     this.shown.frame = frameAt(recording.spans, at.seconds ?? 0);
     this.shown.view = clampView(header, at.view ?? { row: (header.rows - 1) / 2, col: (header.cols - 1) / 2 });
     this.playback.setEnd(timeOf(recording.spans, this.count - 1) + 1 / header.fps);
@@ -117,10 +118,6 @@ export class Engine {
 
   get traffic(): { requests: number; bytes: number } {
     return this.#source?.traffic ?? { requests: 0, bytes: 0 };
-  }
-
-  get hasOriginals(): boolean {
-    return this.#originals !== undefined;
   }
 
   /** The viewpoint that is shown. */
@@ -197,7 +194,7 @@ export class Engine {
   pixels(fine = true): Pixels {
     const frames = this.#supply?.decoded?.frames;
     if (this.#renderer === undefined || frames === undefined) throw new Error("no picture yet");
-    const { look, dolly } = this.shown;
+    const { look, dolly } = placed(this.shown);
     const pixels = this.#renderer.read(frames, this.view, { look, fine, dolly });
     if (this.#immersive === undefined) this.#draw(true); // the canvas may have lost what it showed
     return pixels;
@@ -208,7 +205,7 @@ export class Engine {
     const frames = this.#supply?.decoded?.frames;
     if (this.#renderer === undefined || frames === undefined || this.shown.eyes.mode !== "one") return undefined;
     const { width, height } = this.header;
-    const { look, dolly } = this.shown;
+    const { look, dolly } = placed(this.shown);
     const [column, row] = [Math.floor(x * width), Math.floor(y * height)];
     if (column < 0 || row < 0 || column >= width || row >= height) return undefined;
     return this.#renderer.probe(frames, this.view, { look, dolly, fine: false }, column, row);
@@ -258,11 +255,12 @@ export class Engine {
     this.#playOn(now);
     // While the next frame is decoded, the one that is there can be seen from elsewhere.
     const isReady = (this.isOpen && this.#fetch(viewsShown(this.header, placed(this.shown)))) || this.#drawnView !== this.shown.view;
-    if (isReady && this.#compares() && this.#isDirty && this.#supply?.decoded !== undefined) {
+    const hasOriginal = this.originals?.prepare(this.#renderer, this.#supply?.decoded?.sequence, this.shown) ?? true;
+    if (isReady && hasOriginal && this.#isDirty && this.#supply?.decoded !== undefined) {
       this.#isDirty = false;
       const isFinal = this.#isFinalDue || this.tempo.isQuick;
       this.#draw(isFinal);
-      this.psnr = isFinal ? measure(this.#renderer!, this.#supply.decoded.frames, this.view) : undefined;
+      this.psnr = this.#isFinalDue ? measure(this.#renderer, this.#supply.decoded.frames, this.view) : undefined;
       if (!isFinal) this.tempo.drawn(now);
       else if (this.#isFinalDue) void this.#standing.time(finished(this.#renderer!.gl));
       this.#isFinalDue = false;
@@ -300,9 +298,18 @@ export class Engine {
   /** A picture that stands is drawn as well as can be. */
   #stands(): void {
     this.tempo.rest();
-    if (this.#isFinal || this.playback.isPlaying) return;
+    if (this.playback.isPlaying) return;
+    if (this.#isFinal) return this.#measure();
     this.#isFinalDue = true;
     this.wake();
+  }
+
+  #measure(): void {
+    if (this.psnr !== undefined) return;
+    this.psnr = measure(this.#renderer, this.#supply?.decoded?.frames, this.view);
+    if (this.psnr === undefined) return;
+    this.#draw(true); // the canvas may have lost what it showed
+    this.#events.onState();
   }
 
   #draw(isFinal: boolean): void {
@@ -311,13 +318,6 @@ export class Engine {
     this.#isFinal = isFinal;
     this.#drawnView = this.shown.view;
     drawShown(this.#renderer, this.#canvas, this.header, frames, placed(this.shown), isFinal ? 1 : this.tempo.detail, isFinal);
-  }
-
-  /** Whether the original that is compared with is there, or there is none. */
-  #compares(): boolean {
-    const isDue = this.shown.look === "difference" && this.#originals !== undefined;
-    if (!isDue && this.#renderer !== undefined) this.#renderer.original = undefined;
-    return !isDue || this.#originals!.prepare(this.#renderer!, this.#supply?.decoded?.sequence, this.view);
   }
 
   /** Whether what some views need of the frame that is due is decoded; begins to decode it where it is not. */

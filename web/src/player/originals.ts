@@ -3,6 +3,7 @@
 import type { Viewpoint } from "../geometry.ts";
 import type { CameraFrame } from "../synthesis/camera_textures.ts";
 import type { Pixels, ViewRenderer } from "../synthesis/renderer.ts";
+import { placed, type Shown } from "./shown.ts";
 import { TEXTS } from "./texts.ts";
 
 /** An original is asked for again where somebody comes back to it; these few are kept. */
@@ -24,10 +25,11 @@ export class Originals {
     this.#onCame = onCame;
   }
 
-  /** Give the renderer the picture of a place of the array, or none where there is none; false while it is fetched. */
-  prepare(renderer: ViewRenderer, frame: number | undefined, place: Viewpoint): boolean {
-    const found = frame === undefined ? null : this.#get(frame, place);
-    renderer.original = found ?? undefined;
+  /** Give the renderer the picture to compare with, or none where none is asked for or there is none; false while it is fetched. */
+  prepare(renderer: ViewRenderer | undefined, frame: number | undefined, shown: Shown): boolean {
+    const isDue = shown.look === "difference" && frame !== undefined;
+    const found = isDue ? this.#get(frame, placed(shown).view) : null;
+    if (renderer !== undefined) renderer.original = found ?? undefined;
     return found !== undefined;
   }
 
@@ -53,8 +55,8 @@ export class Originals {
 }
 
 /** Luma PSNR of a view against what the renderer compares with, dB; undefined where that is nothing. */
-export function measure(renderer: ViewRenderer, frames: readonly CameraFrame[], view: Viewpoint): number | undefined {
-  if (renderer.original === undefined) return undefined;
+export function measure(renderer: ViewRenderer | undefined, frames: readonly CameraFrame[] | undefined, view: Viewpoint): number | undefined {
+  if (renderer?.original === undefined || frames === undefined) return undefined;
   return psnr(renderer.read(frames, view, { look: "picture", fine: true, dolly: 0 }), renderer.original);
 }
 

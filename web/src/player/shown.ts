@@ -17,10 +17,11 @@ export interface Shown {
   focus: number | undefined;
 }
 
-/** What is really shown: originals are of places of the array, so a view that is compared with one is the nearest of those. */
+/** What is really shown: originals are of places of the array, so what is compared with one is one sharp view from the nearest of those. */
 export function placed(shown: Shown): Shown {
-  const { look, view } = shown;
-  return look === "difference" ? { ...shown, view: { row: Math.round(view.row), col: Math.round(view.col) } } : shown;
+  if (shown.look !== "difference") return shown;
+  const view = { row: Math.round(shown.view.row), col: Math.round(shown.view.col) };
+  return { ...shown, view, dolly: 0, eyes: { ...shown.eyes, mode: "one" }, focus: undefined };
 }
 
 /** Where a file is shown first, and what it is compared with. */

@@ -110,7 +110,7 @@ export class Ui {
   opened(isViewGiven: boolean): void {
     const engine = this.#engine!;
     this.controls.setRange(engine.header.range);
-    this.controls.offerOriginals(engine.hasOriginals);
+    this.controls.offerOriginals(engine.originals !== undefined);
     this.controls.enable(true);
     this.#big.hidden = engine.count < 2 || this.#host.hasAttribute("autoplay");
     if (engine.header.predicted.length > 0) this.tell(TEXTS.predicted(engine.header.predicted.length));
@@ -228,7 +228,7 @@ export class Ui {
   nextLook(): void {
     const engine = this.#engine;
     if (!engine?.isOpen) return;
-    const looks = LOOKS.filter((name) => name !== "difference" || engine.hasOriginals);
+    const looks = LOOKS.filter((name) => name !== "difference" || engine.originals !== undefined);
     const look = looks[(looks.indexOf(engine.shown.look) + 1) % looks.length];
     void engine.change({ look });
     this.#spoken.textContent = TEXTS.looks[look];
