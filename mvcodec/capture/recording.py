@@ -27,7 +27,7 @@ from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.recorded_pictures import RecordedPicture, RecordingReader
 from mvcodec.container.recorded_rig import RecordedRig
 from mvcodec.errors import InputError, MvCodecWarning
-from mvcodec.frames import FrameSet, Picture
+from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.workers import run_all
 
 MAX_WAITING = 512
@@ -129,29 +129,33 @@ class Recording:
 
     def frame_sets(self) -> Iterator[FrameSet]:
         """Frame sets in order, numbered from 0; warnings at the end count what was dropped."""
+        for found in chain(self._first, self._sets):
+            try:
+                yield self._frame_set(*found)
+            except InputError as error:
+                self._tell_unreadable(error)
+        self._tell_end()
+
+    def _frame_set(self, time_ns: int, found: dict[Position, Picture | Depths]) -> FrameSet:
         array, rows, views = self.array, len(self._settings.topics), self._settings.views
         size, (down, across) = (array.width, array.height), self._settings.split
-        for index, (time_ns, found) in enumerate(chain(self._first, self._sets)):
-            pictures: dict[Position, Picture] = {}
-            given = {}
-            for (row, col), values in found.items():
-                label = f"{self.name}: {self._names[row, col]} at {time_ns / 1e9:.3f} s"
-                if row >= rows:
-                    depths = np.asarray(values, np.float32)
-                    check_map_size(depths, array, label)
-                    given[row - rows, col] = disparity_of_depth(depths, array)
-                    continue
-                if values.shape != (array.height * down, array.width * across, 3):
-                    found_size = f"a picture of {values.shape[1]}x{values.shape[0]} px"
-                    expected = f"{array.width * across}x{array.height * down} px as in the first frame set"
-                    raise InputError(label, found_size, expected)
-                picture = np.asarray(values, np.uint8)
-                for inner_row, inner_col in product(range(down), range(across)):
-                    if (place := (row * down + inner_row, col * across + inner_col)) in views:
-                        pictures[place] = cut_out(picture, inner_row, inner_col, size)
-            self._count = index + 1
-            yield FrameSet(index, time_ns, dict(sorted(pictures.items())), given)
-        self._tell_end()
+        pictures, given = dict[Position, Picture](), dict[Position, DisparityMap]()
+        for (row, col), values in found.items():
+            label = f"{self.name}: {self._names[row, col]} at {time_ns / 1e9:.3f} s"
+            if row >= rows:
+                depths = np.asarray(values, np.float32)
+                check_map_size(depths, array, label)
+                given[row - rows, col] = disparity_of_depth(depths, array)
+                continue
+            if values.shape != (array.height * down, array.width * across, 3):
+                found_size = f"a picture of {values.shape[1]}x{values.shape[0]} px"
+                expected = f"{array.width * across}x{array.height * down} px as in the first frame set"
+                raise InputError(label, found_size, expected)
+            for inner_row, inner_col in product(range(down), range(across)):
+                if (place := (row * down + inner_row, col * across + inner_col)) in views:
+                    pictures[place] = cut_out(np.asarray(values, np.uint8), inner_row, inner_col, size)
+        self._count += 1
+        return FrameSet(self._count - 1, time_ns, dict(sorted(pictures.items())), given)
 
     def _warn(self, text: str) -> None:
         warnings.warn(f"{self.name}: {text}", MvCodecWarning, stacklevel=3)

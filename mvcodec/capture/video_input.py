@@ -132,10 +132,15 @@ class VideoView:
                         self._tell_unreadable(wanted.popleft(), on_unreadable)
                         yield None
                     if wanted and wanted[0] == number:
-                        if (frame.width, frame.height) != self._coded_size:
-                            raise wrong_size(self.path, (frame.width, frame.height), self._coded_size)
                         wanted.popleft()
-                        yield self._orientation.apply(frame_to_rgb(frame, reformatter))
+                        found = frame.width, frame.height
+                        if found == self._coded_size:
+                            yield self._orientation.apply(frame_to_rgb(frame, reformatter))
+                        elif on_unreadable is None:
+                            raise wrong_size(self.path, found, self._coded_size)
+                        else:
+                            on_unreadable(wrong_size(self.path, found, self._coded_size))
+                            yield None
                     if not wanted:
                         return
         except (av.error.FFmpegError, OSError) as error:
