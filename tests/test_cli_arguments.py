@@ -132,6 +132,7 @@ def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixtu
         (["sample", "out", "--size", "big"], "--size: found 'big'"),
         (["decod", "in", "out"], "did you mean decode?"),
         (["encode", "in", "o.mcap", "--codec", "hvec"], "did you mean hevc?"),
+        (["sample", "out", "--size", "1080q"], "480p, 720p, 1080p, 1440p, 4k, 2160p; did you mean 1080p?"),
         (
             ["encode", "in", "o.mcap", "--gird", "2x2"],
             "which the command does not take; did you mean --grid?",
@@ -177,7 +178,7 @@ def test_a_misspelt_name_in_the_library_s_lists_gets_a_suggestion(
     assert main(["encode", str(folder), str(tmp_path / "x.mcap"), "--matcher", "jiont"]) == 2
     message = capsys.readouterr().err
     assert message.startswith("mvcodec: error: --matcher: found jiont, expected one of joint")
-    assert message.endswith("did you mean joint?\n")
+    assert message.endswith("given; did you mean joint?\n")
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mvcodec.errors import SettingError
+from mvcodec.settings import did_you_mean
 from mvcodec.stream import StreamHeader
 
 NEGATIVE_VALUES = ("--convergence", "--disparity-range", "--frames", "--max-depth", "--refocus", "--view")
@@ -126,7 +127,13 @@ COMMON_SIZES |= dict.fromkeys(("4k", "2160p"), (3840, 2160))
 
 def picture_size(text: str) -> tuple[int, int]:
     """``640x360``, or a word that everyone uses, as ``1080p``: (width, height)."""
-    return COMMON_SIZES.get(text.lower()) or pair_of_sizes(text)
+    try:
+        return COMMON_SIZES.get(text.lower()) or pair_of_sizes(text)
+    except argparse.ArgumentTypeError:
+        words = f"{', '.join(COMMON_SIZES)}{did_you_mean(text, COMMON_SIZES)}"
+        raise argparse.ArgumentTypeError(
+            f"found {text!r}, expected WxH such as 640x360, or {words}"
+        ) from None
 
 
 CODEC_WORDS = dict.fromkeys(("h265", "h.265", "x265"), "hevc") | dict.fromkeys(

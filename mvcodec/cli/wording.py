@@ -34,7 +34,9 @@ def in_our_words(message: str, known: Sequence[str]) -> str:
 
 
 def with_suggestion(error: SettingError) -> str:
-    """The error, and what was probably meant where it lists names."""
+    """The error, and what was probably meant where it lists names and does not say so itself."""
+    if "did you mean" in error.expected:
+        return str(error)
     listed = _LISTED.search(error.expected)
     names = re.findall(r"[\w.+-]+", listed[1]) if listed else []
     return f"{error}{meant(str(error.found), names)}"
