@@ -185,6 +185,16 @@ def test_each_view_is_predicted_from_what_is_nearest_and_decoded_before() -> Non
     assert views == [(0, 2), (0, 1), (0, 3)]
 
 
+@pytest.mark.parametrize("most", [0, 1, 2, None])
+def test_what_a_view_builds_on_can_be_kept_few(most: int | None) -> None:
+    array = CameraArray(5, 5, 96, 64, 10.0, (0, 4), (0, 4), make_array(96, 64).calibration)
+    virtual = [view for view in array.positions if view not in array.real]
+    header = EnhancementHeader(layer_order(array, virtual, most))
+    others = [len(header.needed([view])) - 1 for view in virtual]
+    assert len(header.views) == len(virtual)
+    assert max(others) == (8 if most is None else most)
+
+
 def test_another_base_is_told_by_the_checksum(coded: list[list[Packet]]) -> None:
     other = encode(1, enhance=None, qp=20)
     mixed = [packet for packet in coded[0] if packet.track.kind in (TrackKind.LAYER, TrackKind.ENHANCED)]

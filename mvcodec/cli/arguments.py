@@ -38,6 +38,7 @@ OPTIONS = {
     "prediction": "--prediction",
     "enhance": "--enhance",
     "enhance_views": "--enhance-views",
+    "enhance_chain": "--enhance-chain",
     "codec": "--codec",
     "threads": "--threads",
     "anchors": "--anchors",

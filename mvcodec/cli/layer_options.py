@@ -1,4 +1,4 @@
-"""``--enhance`` and ``--enhance-views``: the enhancement layer of ``encode``; and ``--no-enhancement``."""
+"""``--enhance`` and what belongs to it: the enhancement layer of ``encode``; and ``--no-enhancement``."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ def add_layer(parser: argparse.ArgumentParser) -> None:
         metavar="R,C",
         help=settings_of(EncoderConfig)["enhance_views"].help,
     )
+    add_setting(parser, EncoderConfig, "enhance_chain", metavar="N")
 
 
 def add_no_enhancement(parser: argparse.ArgumentParser) -> None:
@@ -41,4 +42,8 @@ def _qp(text: str) -> int | str:
 def layer_settings(arguments: argparse.Namespace) -> dict[str, Any]:
     """The settings of EncoderConfig that they make."""
     views: list[Position] | None = arguments.enhance_views
-    return {"enhance": arguments.enhance, "enhance_views": None if views is None else tuple(views)}
+    return {
+        "enhance": arguments.enhance,
+        "enhance_views": None if views is None else tuple(views),
+        "enhance_chain": arguments.enhance_chain,
+    }

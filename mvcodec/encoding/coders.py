@@ -62,7 +62,9 @@ class Coders:
             assert config.layer_quality is not None
             assert config.enhance is not None
             quantizer = predicted_quantizer(config.layer_quality, self._codec)
-            self._enhancer = Enhancer(header, layer_views, quantizer, config.chosen_preset, config.enhance)
+            self._enhancer = Enhancer(
+                header, layer_views, quantizer, config.chosen_preset, config.enhance, config.enhance_chain
+            )
 
     def push(
         self,

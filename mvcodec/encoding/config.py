@@ -120,6 +120,12 @@ class EncoderConfig:
         "the views of the layer (default: every one that no real camera has)",
         expected="(row, col) of each, whole numbers",
     )
+    enhance_chain: int | None = setting(
+        None,
+        "the most other views of the layer that one may build on: fewer make single views quicker to decode,"
+        " and cost bits (default: any number)",
+        low=0,
+    )
     disparity_median: int | None = setting(
         None,
         "smooth maps over N x N before coding (default: 5, at half size 3)",
@@ -143,8 +149,9 @@ class EncoderConfig:
         check_qp("enhance", None if isinstance(self.enhance, str) else self.enhance, max_qp)
         self.rate.check_scale(max_qp)
         check_settings(self)
-        if self.enhance_views is not None and self.enhance is None:
-            raise SettingError("enhance_views", "given", "enhance beside it")
+        for name in ("enhance_views", "enhance_chain"):
+            if getattr(self, name) is not None and self.enhance is None:
+                raise SettingError(name, "given", "enhance beside it")
         span = self.disparity_range_px
         if span is not None and not (math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]):
             raise SettingError("disparity_range_px", list(span), "lo < hi")

@@ -43,8 +43,14 @@ def enhanced_views(array: CameraArray, asked: Collection[Position] | None) -> tu
     return tuple(view for view in virtual if view in set(asked))
 
 
-def layer_order(array: CameraArray, views: Sequence[Position]) -> tuple[EnhancedView, ...]:
-    """The view that is farthest from all that is decoded comes next, from what is nearest to it."""
+def layer_order(
+    array: CameraArray, views: Sequence[Position], most: int | None = None
+) -> tuple[EnhancedView, ...]:
+    """The view that is farthest from all that is decoded comes next, from what is nearest to it.
+
+    Args:
+        most: other views of the layer that one may build on, by way of others too; None: any number.
+    """
 
     def away(one: Position, other: Position) -> float:
         down = (one[0] - other[0]) / max(array.row_step, 1)
@@ -52,10 +58,18 @@ def layer_order(array: CameraArray, views: Sequence[Position]) -> tuple[Enhanced
         return down * down + across * across
 
     left, decoded, order = list(views), list(array.real), []
+    needs: dict[Position, frozenset[Position]] = dict.fromkeys(array.real, frozenset())
     while left:
         view = max(left, key=lambda view: min(away(view, other) for other in decoded))
-        nearest = sorted(decoded, key=lambda other: (away(view, other), other))[:REFERENCES]
-        order.append(EnhancedView(view, tuple(sorted(nearest))))
+        references: list[Position] = []
+        needed: frozenset[Position] = frozenset()
+        for other in sorted(decoded, key=lambda other: (away(view, other), other)):
+            with_other = needed | needs[other] | ({other} - set(array.real))
+            if len(references) < REFERENCES and (most is None or len(with_other) <= most):
+                references.append(other)
+                needed = with_other
+        needs[view] = needed
+        order.append(EnhancedView(view, tuple(sorted(references))))
         left.remove(view)
         decoded.append(view)
     return tuple(order)
@@ -70,17 +84,24 @@ class Enhancer:
         quantizer: 0..63.
         preset: effort, one of PRESETS.
         asked: what the quantizer was chosen for, for the record.
+        most: as in `layer_order`.
 
     Raises:
         LibvpxMissing: there is no libvpx.
     """
 
     def __init__(
-        self, header: StreamHeader, views: Sequence[Position], quantizer: int, preset: str, asked: int | str
+        self,
+        header: StreamHeader,
+        views: Sequence[Position],
+        quantizer: int,
+        preset: str,
+        asked: int | str,
+        most: int | None = None,
     ) -> None:
         size = even_size(header.array.width, header.array.height)
         coding = ReferenceSettings(*size, quantizer, speed=SPEEDS[preset])
-        self._order = layer_order(header.array, views)
+        self._order = layer_order(header.array, views, most)
         self.header = EnhancementHeader(self._order, {"enhance": asked, "speed": SPEEDS[preset]})
         self._base_header, self._base = header, StreamTracks(header)
         self._encoders = {each.view: Vp9ReferenceEncoder(coding) for each in self._order}

@@ -29,23 +29,40 @@ def _sees(y, x, d, shift_x, shift_y, own):  # type: ignore[no-untyped-def]
     column, row = (at_x + FINE // 2) >> 6, (at_y + FINE // 2) >> 6
     if not (0 <= column < width and 0 <= row < height):
         return False, at_x, at_y
-    return abs(np.int64(own[row, column]) - d) <= TOLERANCE, at_x, at_y
+    return abs(np.int64(own[np.uintp(row), np.uintp(column)]) - d) <= TOLERANCE, at_x, at_y
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _fetch(plane, taps, at_x, at_y, reach):  # type: ignore[no-untyped-def]
-    """A value between pixels, times TAP_SUM squared; taps reach from 1 - reach to reach."""
+def _line(plane, row, left, a, b, c, d):  # type: ignore[no-untyped-def]
+    # Indices without a sign: nothing asks whether they count from the end.
+    y = np.uintp(row)
+    value = a * plane[y, np.uintp(left)] + b * plane[y, np.uintp(left + 1)]
+    return value + c * plane[y, np.uintp(left + 2)] + d * plane[y, np.uintp(left + 3)]
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _fetch_cubic(plane, taps, at_x, at_y):  # type: ignore[no-untyped-def]
+    """A value between pixels, times TAP_SUM squared, from 4 x 4 of them."""
     fine_x, fine_y = (at_x + 2) >> 2, (at_y + 2) >> 2
-    left = (fine_x >> 4) + BORDER + 1 - reach
-    top = (fine_y >> 4) + BORDER + 1 - reach
-    by_x, by_y = taps[fine_x & 15], taps[fine_y & 15]
-    total = np.int64(0)
-    for v in range(2 * reach):
-        line = np.int64(0)
-        for u in range(2 * reach):
-            line += by_x[u] * np.int64(plane[top + v, left + u])
-        total += by_y[v] * line
-    return total
+    left, top = (fine_x >> 4) + BORDER - 1, (fine_y >> 4) + BORDER - 1
+    x, y = np.uintp(fine_x & 15), np.uintp(fine_y & 15)
+    a, b, c, d = taps[x, 0], taps[x, 1], taps[x, 2], taps[x, 3]
+    total = taps[y, 0] * _line(plane, top, left, a, b, c, d)
+    total += taps[y, 1] * _line(plane, top + 1, left, a, b, c, d)
+    total += taps[y, 2] * _line(plane, top + 2, left, a, b, c, d)
+    return total + taps[y, 3] * _line(plane, top + 3, left, a, b, c, d)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _fetch_linear(plane, taps, at_x, at_y):  # type: ignore[no-untyped-def]
+    """A value between pixels, times TAP_SUM squared, from 2 x 2 of them."""
+    fine_x, fine_y = (at_x + 2) >> 2, (at_y + 2) >> 2
+    left, top = (fine_x >> 4) + BORDER, (fine_y >> 4) + BORDER
+    u, v, row, below = np.uintp(left), np.uintp(left + 1), np.uintp(top), np.uintp(top + 1)
+    x, y = np.uintp(fine_x & 15), np.uintp(fine_y & 15)
+    upper = taps[x, 0] * plane[row, u] + taps[x, 1] * plane[row, v]
+    lower = taps[x, 0] * plane[below, u] + taps[x, 1] * plane[below, v]
+    return taps[y, 0] * upper + taps[y, 1] * lower
 
 
 @njit(cache=True, nogil=True)
@@ -75,22 +92,26 @@ def predict_luma(
         out: uint8 (H, W), rows first..last-1 overwritten.
     """
     width = disparity.shape[1]
-    seen = np.empty(width, np.bool_)
+    values, totals = np.empty(width, np.int64), np.empty(width, np.int64)
     scale = np.int64(TAP_SUM * TAP_SUM)
     for y in range(first, last):
-        for x in range(width):
-            d = np.int64(disparity[y, x])
-            total = value = np.int64(0)
-            for i in range(len(weights)):
-                there, at_x, at_y = _sees(y, x, d, shifts[i, 0], shifts[i, 1], maps[i])
+        values[:] = 0
+        totals[:] = 0
+        here = disparity[y]
+        for i in range(len(weights)):
+            own, plane, weight = maps[i], planes[i], weights[i]
+            shift_x, shift_y = shifts[i, 0], shifts[i, 1]
+            for x in range(width):
+                there, at_x, at_y = _sees(y, x, np.int64(here[x]), shift_x, shift_y, own)
                 if there:
-                    value += weights[i] * _fetch(planes[i], taps, at_x, at_y, 2)
-                    total += weights[i]
-            seen[x] = total > 0
-            if total > 0:
-                total *= scale
-                rounded = (2 * value + total) // (2 * total)
+                    values[x] += weight * _fetch_cubic(plane, taps, at_x, at_y)
+                    totals[x] += weight
+        for x in range(width):
+            if totals[x] > 0:
+                total = totals[x] * scale
+                rounded = (2 * values[x] + total) // (2 * total)
                 out[y, x] = np.uint8(min(max(rounded, np.int64(0)), np.int64(255)))
+        seen = totals > 0
         _repeat(seen, disparity[y], 1, out[y], 128)
 
 
@@ -116,25 +137,30 @@ def predict_chroma(
         out: uint8 (2, H / 2, W / 2), rows first..last-1 overwritten.
     """
     width = out.shape[2]
-    seen = np.empty(width, np.bool_)
+    values, totals = np.empty((2, width), np.int64), np.empty(width, np.int64)
     scale = np.int64(TAP_SUM * TAP_SUM)
     for y in range(first, last):
-        for x in range(width):
-            d = np.int64(disparity[2 * y, 2 * x])
-            total = first_value = second_value = np.int64(0)
-            for i in range(len(weights)):
-                there, _, _ = _sees(2 * y, 2 * x, d, shifts[i, 0], shifts[i, 1], maps[i])
+        values[:] = 0
+        totals[:] = 0
+        here = disparity[2 * y]
+        for i in range(len(weights)):
+            own, blue, red, weight = maps[i], planes[i, 0], planes[i, 1], weights[i]
+            shift_x, shift_y = shifts[i, 0], shifts[i, 1]
+            for x in range(width):
+                d = np.int64(here[2 * x])
+                there, _, _ = _sees(2 * y, 2 * x, d, shift_x, shift_y, own)
                 if there:
-                    at_x = FINE * x + ((shifts[i, 0] * d + 2 * HALF_SHIFT) >> 17)
-                    at_y = FINE * y + ((shifts[i, 1] * d + 2 * HALF_SHIFT) >> 17)
-                    first_value += weights[i] * _fetch(planes[i, 0], taps, at_x, at_y, 1)
-                    second_value += weights[i] * _fetch(planes[i, 1], taps, at_x, at_y, 1)
-                    total += weights[i]
-            seen[x] = total > 0
-            if total > 0:
-                total *= scale
-                out[0, y, x] = (2 * first_value + total) // (2 * total)
-                out[1, y, x] = (2 * second_value + total) // (2 * total)
+                    at_x = FINE * x + ((shift_x * d + 2 * HALF_SHIFT) >> 17)
+                    at_y = FINE * y + ((shift_y * d + 2 * HALF_SHIFT) >> 17)
+                    values[0, x] += weight * _fetch_linear(blue, taps, at_x, at_y)
+                    values[1, x] += weight * _fetch_linear(red, taps, at_x, at_y)
+                    totals[x] += weight
+        for x in range(width):
+            if totals[x] > 0:
+                total = totals[x] * scale
+                out[0, y, x] = (2 * values[0, x] + total) // (2 * total)
+                out[1, y, x] = (2 * values[1, x] + total) // (2 * total)
+        seen = totals > 0
         _repeat(seen, disparity[2 * y], 2, out[0, y], 128)
         _repeat(seen, disparity[2 * y], 2, out[1, y], 128)
 

@@ -101,7 +101,9 @@ def splat(disparity: IntMap, shift_x: int, shift_y: int, out: IntMap) -> None:
             above = 1 if part_y <= -spill else 0
             for row in range(max(v - above, 0), min(v + below + 1, height)):
                 for column in range(max(u - left, 0), min(u + right + 1, width)):
-                    out[row, column] = max(out[row, column], d)
+                    # Indices without a sign: nothing asks whether they count from the end.
+                    at = np.uintp(row), np.uintp(column)
+                    out[at] = max(out[at], d)
 
 
 @njit(cache=True, nogil=True)
