@@ -13,7 +13,7 @@ from small_arrays import write_array
 
 from mvcodec.capture import open_input
 from mvcodec.capture.numbered_files import find_views
-from mvcodec.errors import InputError, SettingError
+from mvcodec.errors import InputError, MvCodecWarning, SettingError
 
 
 def folder_of(tmp_path: Path, names: Sequence[str]) -> Path:
@@ -100,3 +100,20 @@ def test_a_folder_that_is_not_there_is_told_from_an_empty_one(tmp_path: Path) ->
     assert "missing: found nothing there, expected a folder of pictures or videos" in fails(
         1, "init", missing
     )
+
+
+def test_a_frame_that_one_view_alone_lacks_is_named(tmp_path: Path) -> None:
+    names = [f"r0_c{col}_{frame:03d}.png" for col in (0, 1) for frame in range(7, 13) if frame != 9 + col]
+    with pytest.raises(InputError, match=r"found frames that view 0,0 or view 0,1 lacks"):
+        find_views(folder_of(tmp_path, names))
+
+
+def test_frames_that_all_views_lack_are_told(tmp_path: Path) -> None:
+    names = [f"r0_c{col}_{frame:03d}.png" for col in (0, 1) for frame in (7, 8, 10, 11)]
+    with pytest.warns(MvCodecWarning, match="1 frames are missing between the first and the last"):
+        assert len(find_views(folder_of(tmp_path, names)).files[0, 0]) == 4
+
+
+def test_numbers_that_are_times_may_differ(tmp_path: Path) -> None:
+    names = [f"r0_c{col}_{10**15 + 33_000 * frame + 7 * col}.png" for col in (0, 1) for frame in range(5)]
+    assert len(find_views(folder_of(tmp_path, names)).files[0, 1]) == 5

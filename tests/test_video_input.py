@@ -152,7 +152,7 @@ def test_bad_files(tmp_path: Path) -> None:
         container.mux(stream.encode(frame))
     for name, reason in (
         ("text.mp4", "an unreadable video"),
-        ("empty.mp4", "an unreadable video"),
+        ("empty.mp4", "an empty file"),
         ("cut.mp4", "(an unreadable video|no video stream)"),
         ("sound.wav", "no video stream"),
         ("gone.mp4", "nothing there"),

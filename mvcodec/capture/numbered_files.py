@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
 from mvcodec.array import Position
-from mvcodec.errors import InputError, SettingError
+from mvcodec.errors import InputError, MvCodecWarning, SettingError
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".tif", ".tiff")
 VIDEO_SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".ts", ".h264", ".hevc", ".y4m")
 
 _NUMBER = re.compile(r"\d+")
 _ROW_AND_COLUMN = re.compile(r"(?i)(?<![a-z])r(?:ow)?_?(\d+)[_-]?c(?:ol)?_?(\d+)")
+
+_SPARSE = 3
+"""Numbers that count frames are not that much more than frames; times are."""
 
 Numbers = tuple[int, ...]
 
@@ -47,7 +51,7 @@ def find_views(folder: Path, grid: tuple[int, int] | None = None) -> FoundViews:
         grid: (rows, cols); needed where names have one number for the camera.
 
     Raises:
-        InputError: no such files, files that are named differently, or one that is missing.
+        InputError: no such files, files that are named differently, or one that is missing in a view.
         SettingError: `grid` is needed, or another one than that of the names.
     """
     names, videos = _listed(folder)
@@ -65,7 +69,40 @@ def find_views(folder: Path, grid: tuple[int, int] | None = None) -> FoundViews:
         if count != counts[0, 0] or (videos and count != 1):
             found = f"{count} files for view {view[0]},{view[1]}, such as {files[view][0]}"
             raise InputError(folder, found, f"{1 if videos else counts[0, 0]} as for view 0,0")
+    if not videos:
+        frames = {view: [number for number, _ in cameras[key]] for view, key in places.items()}
+        _check_counters(folder, frames)
     return FoundViews(rows, cols, files, videos)
+
+
+def _check_counters(folder: Path, frames: Mapping[Position, Sequence[Numbers]]) -> None:
+    """Where frames are counted, all views must lack the same ones: others would be of different moments.
+
+    Raises:
+        InputError: a view lacks a frame that another one has.
+    """
+    counted: dict[Position, list[int]] = {}
+    for view, numbers in frames.items():
+        found = [number[-1] for number in numbers if number]
+        if not found or found[-1] - found[0] >= _SPARSE * len(found):
+            return  # no frame's number, or one that is a time
+        counted[view] = [number - found[0] for number in found]
+    for view, own in counted.items():
+        if own != counted[0, 0]:
+            place = next(n for n, (a, b) in enumerate(zip(own, counted[0, 0], strict=True)) if a != b)
+            raise InputError(
+                folder,
+                f"frames that view 0,0 or view {view[0]},{view[1]} lacks, from its number {place} on",
+                "the same numbers in every view, or an array.json with times_ns",
+            )
+    missing = counted[0, 0][-1] + 1 - len(counted[0, 0])
+    if missing:
+        warnings.warn(
+            f"{folder}: {missing} frames are missing between the first and the last: the others are taken as"
+            " following each other; `times_ns` in array.json says when they were taken",
+            MvCodecWarning,
+            stacklevel=3,
+        )
 
 
 def _listed(folder: Path) -> tuple[list[str], bool]:

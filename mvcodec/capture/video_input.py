@@ -282,5 +282,7 @@ def _video_stream(container: InputContainer, path: Path) -> VideoStream:
 def _unreadable(path: Path, error: Exception) -> InputError:
     if isinstance(error, FileNotFoundError):
         return InputError(path, "no such file", "a video file")
+    if path.is_file() and not path.stat().st_size:
+        return InputError(path, "an empty file", "a video file")
     reason = getattr(error, "strerror", None) or str(error)
     return InputError(path, f"an unreadable video ({reason})", "a video file")
