@@ -1,6 +1,6 @@
 """How time and memory grow: with picture size, levels, real cameras, virtual views and frames.
 
-    python tools/time_growth.py [--sweeps size,levels,cameras,views,frames] [--figure FILE.svg]
+    python tools/time_growth.py [--sweeps size,levels,cameras,views,frames] [--figure FILE.png]
 
 CPU time of one thread, each sweep in a process of its own, from small to large, so that the most memory
 that the process had at each step is that step's own. Pictures are two planes of noise; compiled code and one
@@ -153,9 +153,14 @@ def power(line: list[Step]) -> float:
     return math.log(late / early) / math.log(after / before)
 
 
+def _short(amount: float) -> str:
+    return f"{amount:g}" if amount < 1e4 else f"{amount / 1e6:.1f} M"
+
+
 def draw(lines: dict[tuple[str, str], list[Step]], path: Path) -> None:
     """A panel for each sweep, and one for memory; all axes logarithmic."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     sweeps = list(dict.fromkeys(sweep for sweep, _ in lines))
     figure = Figure(figsize=(9, 5.6), layout="constrained")
@@ -168,14 +173,16 @@ def draw(lines: dict[tuple[str, str], list[Step]], path: Path) -> None:
                 amounts, seconds, mib = zip(*line, strict=True)
                 figures = mib if sweep == "memory" else seconds
                 panel.loglog(amounts, figures, ".-", color=colours[what], label=what)
+                panel.set_xticks(amounts, [_short(amount) for amount in amounts])
         panel.set_xlabel(SWEEPS["size" if sweep == "memory" else sweep][0], fontsize=8)
         panel.set_ylabel("MiB" if sweep == "memory" else "CPU seconds", fontsize=8)
-        panel.tick_params(labelsize=7)
+        panel.tick_params(which="both", labelsize=7)
+        panel.xaxis.set_minor_formatter(NullFormatter())
         panel.grid(alpha=0.3)
         panel.legend(fontsize=7)
     for panel in panels:
         panel.set_axis_off()
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=100)
 
 
 def main() -> int:
