@@ -204,6 +204,17 @@ def test_an_ideal_camera_keeps_its_picture() -> None:
     np.testing.assert_array_equal(Rectifier(rig).picture((0, 0), picture), picture)
 
 
+def test_pictures_between_pixels_keep_their_finest_detail_and_their_flat_parts() -> None:
+    cameras = {(0, 0): a_camera((0, 0, 0), (0, 0))}
+    rig = Rig(1, 1, SIZE, cameras, Rectified(*SIZE, 320.0, (160.0, 99.5)), "file", {})
+    wave = 128 + 60 * np.sin(2 * np.pi * 0.38 * np.arange(SIZE[0]))
+    for line, spread in ((wave, 60 / np.sqrt(2)), (np.full(SIZE[0], 90.0), 0.0)):
+        picture = np.broadcast_to(np.rint(line)[None, :, None], (*SIZE[::-1], 3)).astype(np.uint8)
+        inside = Rectifier(rig).picture((0, 0), picture)[20:-20, 20:-20].astype(float)
+        assert 0.92 * spread <= inside.std() <= 1.05 * spread
+        assert abs(inside.mean() - line.mean()) < 1
+
+
 def test_gains_and_offsets_are_taken_out() -> None:
     """Two cameras show the same picture, one of them dimmer and lifted."""
     draw = np.random.default_rng(4)
