@@ -219,14 +219,15 @@ def _packets(
     started, first = False, None
     held: _Packet | None = None
     found_loss = False
+    # In MPEG-TS FFmpeg may find a loss a picture earlier or later than it was.
+    exact = container.format.name != "mpegts"
     for number, packet in enumerate(with_data(container, stream, cut_off, set_back)):
         pts, dts, discard, keyframe = packet.pts, packet.dts, packet.is_discard, packet.is_keyframe
         started = started or keyframe
         first = pts if first is None and started else first
-        # FFmpeg may find a loss on the way a picture earlier or later than it was.
-        found_before, found_loss = found_loss, packet.is_corrupt
+        found_before, found_loss = found_loss and not exact, packet.is_corrupt
         if held is not None:
-            yield replace(held, why=held.why or _DAMAGED) if found_loss else held
+            yield replace(held, why=held.why or _DAMAGED) if found_loss and not exact else held
         why = _reason(packet, plain, whole, lost=found_loss or found_before)
         if why is None and (not started or (pts is not None and first is not None and pts < first)):
             # Pictures that are shown before the first keyframe build on what came before it.
