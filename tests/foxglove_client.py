@@ -1,4 +1,4 @@
-"""A client of Foxglove's WebSocket protocol: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md."""
+"""A client of Foxglove's WebSocket protocol: https://github.com/foxglove/ws-protocol (its specification)."""
 
 from __future__ import annotations
 
