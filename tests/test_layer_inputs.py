@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import fails, succeeds
+from command_line import succeeds
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from mcap_protobuf.writer import Writer
 from PIL import Image
@@ -18,6 +18,7 @@ from mvcodec.capture.recording_settings import RecordingSettings
 from mvcodec.conformance.validation import validate
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.evaluation.metrics import psnr
+from mvcodec.rigs.rig import Lens, Rectified, Rig, RigCamera, rig_text
 
 GRID = tuple(tuple(f"/cam{row}{col}" for col in range(ARRAY.cols)) for row in range(ARRAY.rows))
 TOPICS = ";".join(",".join(row) for row in GRID)
@@ -60,10 +61,26 @@ def test_a_recording_is_coded_with_a_layer(recorded: Path, tmp_path: Path) -> No
     succeeds("encode", recorded, some, "--enhance", "24", "--enhance-views", "1,2", *options)
     with Decoder.open(some, enhanced=None) as decoder:
         assert [list(decoded.enhanced) for decoded in decoder] == [[(1, 2)]] * 2
-    line = fails(
-        2, "encode", recorded, tmp_path / "no.mcap", "--enhance", "24", "--rig", "recorded", *options
-    )
-    assert "--enhance: found with --rig and a recording" in line
+
+
+def test_a_recording_is_rectified_originals_and_all(recorded: Path, tmp_path: Path) -> None:
+    size = ARRAY.width, ARRAY.height
+    middle = (size[0] - 1) / 2, (size[1] - 1) / 2
+    lens = Lens("pinhole", (100.0, 100.0), middle, (0.0,) * 4)
+    half, added = np.full(3, 0.5), np.full(3, 20.0)
+    cameras = {
+        at: RigCamera(lens, np.eye(3), np.array([at[1], at[0], 0.0]), half, added) for at in ARRAY.positions
+    }
+    rig = tmp_path / "rig.json"
+    rig.write_text(rig_text(Rig(3, 3, size, cameras, Rectified(*size, 100.0, middle), "file", {})))
+    options = ["--topics", TOPICS, "--qp", "36", "--matcher", "sgbm", "--preset", "veryfast", "--quiet"]
+    coded = tmp_path / "x.mcap"
+    succeeds("encode", recorded, coded, "--enhance", "24", "--rig", rig, "--disparity-range", "0,12", *options)
+    with Decoder.open(coded, enhanced=None) as decoder:
+        for decoded, taken in zip(decoder, frames(2), strict=True):
+            for view in VIRTUAL:
+                straight = np.rint(taken.pictures[view] / 2 + 20).astype(np.uint8)
+                assert psnr(decoded.enhanced[view].pixels, straight) > 30
 
 
 def test_pictures_of_a_recording_are_the_originals(recorded: Path) -> None:
