@@ -75,7 +75,9 @@ def test_a_recording_is_rectified_originals_and_all(recorded: Path, tmp_path: Pa
     rig.write_text(rig_text(Rig(3, 3, size, cameras, Rectified(*size, 100.0, middle), "file", {})))
     options = ["--topics", TOPICS, "--qp", "36", "--matcher", "sgbm", "--preset", "veryfast", "--quiet"]
     coded = tmp_path / "x.mcap"
-    succeeds("encode", recorded, coded, "--enhance", "24", "--rig", rig, "--disparity-range", "0,12", *options)
+    succeeds(
+        "encode", recorded, coded, "--enhance", "24", "--rig", rig, "--disparity-range", "0,12", *options
+    )
     with Decoder.open(coded, enhanced=None) as decoder:
         for decoded, taken in zip(decoder, frames(2), strict=True):
             for view in VIRTUAL:

@@ -11,6 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvcodec.kernels.view_marks import list_marked
+
 Plane = NDArray[np.uint8]
 IntMap = NDArray[np.int32]
 
@@ -43,19 +45,34 @@ def enlarge(small: IntMap, luma: Plane, out: IntMap) -> None:
     """
     height, width = out.shape
     rows, columns = small.shape
+    sums, high, low = np.empty(columns, np.int32), np.empty(columns, np.int32), np.empty(columns, np.int32)
+    marks, chosen = np.empty(columns, np.uint8), np.empty(columns, np.int32)
     for y in range(height):
-        up, down = max((y - 1) // 2, 0), min((y + 1) // 2, rows - 1)
-        near_down = 3 if y % 2 == 0 else 1  # of 4: the weight of the row `down` on even rows, of `up` else
-        for x in range(width):
-            left, right = max((x - 1) // 2, 0), min((x + 1) // 2, columns - 1)
-            a, b, c, d = small[up, left], small[up, right], small[down, left], small[down, right]
-            if max(max(a, b), max(c, d)) - min(min(a, b), min(c, d)) <= SMOOTH:
-                near_right = 3 if x % 2 == 0 else 1
-                above = (4 - near_right) * a + near_right * b
-                below = (4 - near_right) * c + near_right * d
-                out[y, x] = ((4 - near_down) * above + near_down * below + 8) >> 4
-            else:
-                out[y, x] = _by_luma(small, luma, y, x)
+        above, below = small[max((y - 1) // 2, 0)], small[min((y + 1) // 2, rows - 1)]
+        near = np.int32(
+            3 if y % 2 == 0 else 1
+        )  # of 4: the weight of the row below on even rows, of above else
+        line = out[y]
+        for u in range(columns):  # vectorised
+            sums[u] = (np.int32(4) - near) * above[u] + near * below[u]
+            high[u], low[u] = max(above[u], below[u]), min(above[u], below[u])
+        _enlarge_row(sums, high, low, line, marks)
+        for x in (0, width - 1) if width > 2 * columns - 1 else (0, 0):
+            u = x // 2
+            line[x] = _by_luma(small, luma, y, x) if high[u] - low[u] > SMOOTH else (4 * sums[u] + 8) >> 4
+        for u in chosen[: list_marked(marks[: columns - 1], chosen)]:
+            line[2 * u + 1] = _by_luma(small, luma, y, 2 * u + 1)
+            line[2 * u + 2] = _by_luma(small, luma, y, 2 * u + 2)
+
+
+@njit(cache=True, nogil=True)
+def _enlarge_row(sums, high, low, line, marks):  # type: ignore[no-untyped-def]
+    """Both pixels between each two samples of a row, bilinearly; marks where these are not one surface."""
+    three, eight, four = np.int32(3), np.int32(8), np.int32(4)
+    for u in range(sums.size - 1):  # vectorised
+        line[2 * u + 1] = (three * sums[u] + sums[u + 1] + eight) >> four
+        line[2 * u + 2] = (sums[u] + three * sums[u + 1] + eight) >> four
+        marks[u] = max(high[u], high[u + 1]) - min(low[u], low[u + 1]) > SMOOTH
 
 
 @njit(cache=True, nogil=True)
@@ -83,27 +100,69 @@ def splat(disparity: IntMap, shift_x: int, shift_y: int, out: IntMap) -> None:
     Args:
         disparity: int32 (H, W).
         shift_x, shift_y: 65536ths of a pixel that a pixel moves (left, up) for each pixel of disparity.
-        out: int32 (H, W), overwritten; UNKNOWN where nothing lands.
+        out: int32 (H + 2, W + 2), C-contiguous, overwritten: the view with a border of one pixel, in which
+            what leaves the picture lands; UNKNOWN where nothing does.
     """
     height, width = disparity.shape
-    out[:] = UNKNOWN
-    spill = FINE - REACH
+    stride = np.int32(width + 2)
+    flat = out.ravel()
+    flat[:] = UNKNOWN
+    places = np.empty(width, np.int32)
+    beside, above = np.empty(width, np.int32), np.empty(width, np.int32)
+    chosen = np.empty(width, np.int32)
     for y in range(height):
+        row = disparity[y]
+        _targets(row, y, height, shift_x, shift_y, stride, places, beside, above)
+        count = 0
         for x in range(width):
-            d = disparity[y, x]
-            at_x = FINE * x - ((shift_x * d + HALF_SHIFT) >> 16)
-            at_y = FINE * y - ((shift_y * d + HALF_SHIFT) >> 16)
-            u, v = (at_x + FINE // 2) >> 6, (at_y + FINE // 2) >> 6
-            part_x, part_y = at_x - FINE * u, at_y - FINE * v
-            right = 1 if part_x >= spill else 0
-            left = 1 if part_x <= -spill else 0
-            below = 1 if part_y >= spill else 0
-            above = 1 if part_y <= -spill else 0
-            for row in range(max(v - above, 0), min(v + below + 1, height)):
-                for column in range(max(u - left, 0), min(u + right + 1, width)):
-                    # Indices without a sign: nothing asks whether they count from the end.
-                    at = np.uintp(row), np.uintp(column)
-                    out[at] = max(out[at], d)
+            place = np.uint32(places[x])
+            flat[place] = max(flat[place], row[x])
+            chosen[count] = x
+            count += (beside[x] | above[x]) != 0
+        for x in chosen[:count]:  # again where one of them is 0, which costs less than to ask
+            d = row[x]
+            for step in (beside[x], above[x], np.int32(beside[x] + above[x])):
+                place = np.uint32(places[x] + step)
+                flat[place] = max(flat[place], d)
+
+
+@njit(cache=True, nogil=True)
+def _targets(row, y, height, shift_x, shift_y, stride, places, beside, above):  # type: ignore[no-untyped-def]
+    """Where the pixels of a row go, and the steps to the neighbours that they cover too, 0 where none."""
+    fine, half, spill = np.int32(FINE), np.int32(FINE // 2), np.int32(FINE - REACH)
+    right, bottom = np.int32(FINE * row.size), np.int32(FINE * height)
+    by_x, by_y = np.int64(np.int32(shift_x)), np.int64(np.int32(shift_y))
+    for x in range(row.size):  # vectorised: no branch
+        d = np.int64(row[x])
+        at_x = np.int32(FINE * x) - np.int32((by_x * d + HALF_SHIFT) >> 16)
+        at_y = np.int32(FINE * y) - np.int32((by_y * d + HALF_SHIFT) >> 16)
+        at_x, at_y = min(max(at_x, -fine), right), min(max(at_y, -fine), bottom)
+        u, v = (at_x + half) >> np.int32(6), (at_y + half) >> np.int32(6)
+        part_x, part_y = at_x - fine * u, at_y - fine * v
+        places[x] = (v + np.int32(1)) * stride + u + np.int32(1)
+        beside[x] = np.int32(part_x >= spill) - np.int32(part_x <= -spill)
+        above[x] = (np.int32(part_y >= spill) - np.int32(part_y <= -spill)) * stride
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _common(moved, weights, y, mean, marks):  # type: ignore[no-untyped-def]
+    """The cameras' mean for a row, rounded down; marks where they do not say the same surface."""
+    width = mean.size
+    total, sums = np.zeros(width, np.float64), np.zeros(width, np.float64)
+    nearest, farthest = np.full(width, UNKNOWN, np.int32), np.full(width, -UNKNOWN, np.int32)
+    for i in range(len(weights)):
+        row, weight = moved[i, y + 1, 1:-1], np.float64(weights[i])
+        for x in range(width):  # vectorised: no branch
+            known = row[x] > UNKNOWN
+            part = weight if known else 0.0
+            total[x] += part
+            sums[x] += part * np.float64(row[x])
+            nearest[x] = max(nearest[x], row[x])
+            farthest[x] = min(farthest[x], row[x] if known else np.int32(-UNKNOWN))
+    for x in range(width):
+        found = np.floor(sums[x] / max(total[x], 1.0))
+        mean[x] = np.int32(found) if total[x] > 0 else np.int32(UNKNOWN)
+        marks[x] = nearest[x] - farthest[x] > TOLERANCE
 
 
 @njit(cache=True, nogil=True)
@@ -115,17 +174,19 @@ def vote(moved: NDArray[np.int32], weights: NDArray[np.int64], out: IntMap, firs
     RATIO times those of the winner so far.
 
     Args:
-        moved: int32 (N, H, W), see `splat`.
+        moved: int32 (N, H + 2, W + 2), see `splat`.
         weights: int64 (N,), of the cameras, above 0.
         out: int32 (H, W), rows first..last-1 overwritten; UNKNOWN where no camera knows.
     """
-    count, _, width = moved.shape
+    count, width = len(moved), out.shape[1]
     near, weigh = np.empty(count, np.int64), np.empty(count, np.int64)
+    marks, chosen = np.empty(width, np.uint8), np.empty(width, np.int32)
     for y in range(first, last):
-        for x in range(width):
+        _common(moved, weights, y, out[y], marks)
+        for x in chosen[: list_marked(marks, chosen)]:
             known = 0
             for i in range(count):
-                d = np.int64(moved[i, y, x])
+                d = np.int64(moved[i, y + 1, x + 1])
                 if d == UNKNOWN:
                     continue
                 place = known
@@ -134,17 +195,23 @@ def vote(moved: NDArray[np.int32], weights: NDArray[np.int64], out: IntMap, firs
                     place -= 1
                 near[place], weigh[place] = d, weights[i]
                 known += 1
-            best, strength, start = np.int64(UNKNOWN), np.int64(0), 0
-            while start < known:
-                end, total, sums = start, np.int64(0), np.int64(0)
-                while end < known and near[start] - near[end] <= TOLERANCE:
-                    total += weigh[end]
-                    sums += weigh[end] * near[end]
-                    end += 1
-                if start == 0 or RATIO_DEN * total > RATIO_NUM * strength:
-                    best, strength = sums // total, total
-                start = end
-            out[y, x] = best
+            out[y, x] = _outvoted(near, weigh, known)
+
+
+@njit(cache=True, nogil=True)
+def _outvoted(near, weigh, known):  # type: ignore[no-untyped-def]
+    """The winner of disparities that are sorted near to far."""
+    best, strength, start = np.int64(UNKNOWN), np.int64(0), 0
+    while start < known:
+        end, total, sums = start, np.int64(0), np.int64(0)
+        while end < known and near[start] - near[end] <= TOLERANCE:
+            total += weigh[end]
+            sums += weigh[end] * near[end]
+            end += 1
+        if start == 0 or RATIO_DEN * total > RATIO_NUM * strength:
+            best, strength = sums // total, total
+        start = end
+    return best
 
 
 @njit(cache=True, nogil=True)
@@ -152,7 +219,10 @@ def fill(disparity: IntMap, fallback: int) -> None:
     """Fill what is unknown in place by the farther end of its gap on the row; whole rows with `fallback`."""
     height, width = disparity.shape
     for y in range(height):
-        x = 0
+        unknown = 0
+        for x in range(width):  # vectorised
+            unknown += disparity[y, x] == UNKNOWN
+        x = 0 if unknown else width
         while x < width:
             if disparity[y, x] != UNKNOWN:
                 x += 1

@@ -157,6 +157,45 @@ def _add_fetched(_typing, luma, colour, weights, sums, at, place, stride, phase,
     return types.void(*arguments), generate
 
 
+def _fetch_luma(_typing, plane, weights, place, stride, phase):  # type: ignore[no-untyped-def]
+    """A value between pixels of a plane, times the sum of its weights: int32.
+
+    Args:
+        plane: flat int16 with a border.
+        weights: flat int16, SHARES for each phase, as `fetch_weights` has them.
+        place, stride, phase: uintp; of the pixel up left, pixels of a row, and which weights.
+    """
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        pixels, shares = _pointers(context, builder, signature, values)
+        share = builder.mul(values[4], ir.Constant(values[4].type, SHARES))
+        total = _luma(builder, pixels, shares, share, values[2], values[3])
+        return builder.extract_element(total, ir.Constant(WORD, 0))
+
+    return types.int32(plane, weights, place, stride, phase), generate
+
+
+def _fetch_colour(_typing, plane, weights, place, stride, phase):  # type: ignore[no-untyped-def]
+    """Two values at once, as `fetch_luma`, linearly: the plane holds two numbers for each pixel."""
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        pixels, shares = _pointers(context, builder, signature, values)
+        share = builder.mul(values[4], ir.Constant(values[4].type, SHARES))
+        total = _colour(builder, pixels, shares, share, values[2], values[3])
+        both = [builder.extract_element(total, ir.Constant(WORD, lane)) for lane in (0, 1)]
+        return context.make_tuple(builder, signature.return_type, both)
+
+    return types.UniTuple(types.int32, 2)(plane, weights, place, stride, phase), generate
+
+
+def _pointers(context, builder, signature, values):  # type: ignore[no-untyped-def]
+    """Those of the first two arguments, which are arrays."""
+    return [
+        context.make_array(kind)(context, builder, value).data
+        for kind, value in zip(signature.args[:2], values[:2], strict=True)
+    ]
+
+
 def _clip(builder, numbers, low, high):  # type: ignore[no-untyped-def]
     """Numbers kept within low..high."""
     for sign, limit in ((">", low), ("<", high)):
@@ -283,6 +322,8 @@ def _store_colour(_typing, sums, at, pixels, place):  # type: ignore[no-untyped-
 
 
 add_fetched: Any = intrinsic(_add_fetched)
+fetch_luma: Any = intrinsic(_fetch_luma)
+fetch_colour: Any = intrinsic(_fetch_colour)
 store_colour: Any = intrinsic(_store_colour)
 store_lanes: Any = intrinsic(_store_lanes)
 add_lanes: Any = intrinsic(_add_lanes)

@@ -50,14 +50,15 @@ class PredictionSource:
     disparity: IntMap
 
     @cached_property
-    def luma(self) -> Plane:
-        """Luma, continued by BORDER."""
-        return np.pad(self.planes.y, BORDER, mode="edge")
+    def luma(self) -> NDArray[np.int16]:
+        """int16 (H + 4, W + 4): luma, continued by BORDER."""
+        return np.pad(self.planes.y.astype(np.int16), BORDER, mode="edge")
 
     @cached_property
-    def chroma(self) -> Plane:
-        """uint8 (2, H / 2 + 4, W / 2 + 4): Cb and Cr, continued by BORDER."""
-        return np.stack([np.pad(plane, BORDER, mode="edge") for plane in (self.planes.u, self.planes.v)])
+    def chroma(self) -> NDArray[np.int16]:
+        """int16 (H / 2 + 4, W / 2 + 4, 2): Cb and Cr, continued by BORDER."""
+        both = np.stack([self.planes.u, self.planes.v], axis=2).astype(np.int16)
+        return np.pad(both, ((BORDER, BORDER), (BORDER, BORDER), (0, 0)), mode="edge")
 
 
 def full_map(codes: Plane, luma: Plane, range_px: tuple[float, float], scale: int) -> IntMap:
@@ -90,7 +91,7 @@ def predicted_disparity(
 
     cameras = sorted(maps)
     shape = next(iter(maps.values())).shape
-    moved = np.empty((len(cameras), *shape), np.int32)
+    moved = np.empty((len(cameras), shape[0] + 2, shape[1] + 2), np.int32)
     shifts = zip(*(_shift(array, camera, place) for camera in cameras), strict=True)
     run_all(splat, [maps[camera] for camera in cameras], *shifts, moved)
     voted = np.empty(shape, np.int32)
@@ -118,15 +119,15 @@ def predict(
     ordered = sorted(sources, key=lambda source: source.place)
     maps = np.stack([source.disparity for source in ordered])
     places = [source.place for source in ordered]
-    shifts = np.array([_shift(array, camera, place) for camera in places], np.int64)
+    shifts = np.array([_shift(array, camera, place) for camera in places], np.int32)
     weights = _weights(array, places, place)
     height, width = disparity.shape
     y = np.empty((height, width), np.uint8)
     chroma = np.empty((2, height // 2, width // 2), np.uint8)
     luma_planes = np.stack([source.luma for source in ordered])
-    run_in_bands(height, predict_luma, luma_planes, maps, shifts, weights, CUBIC, disparity, y)
+    run_in_bands(height, predict_luma, luma_planes, maps, shifts, weights, TAPS, disparity, y)
     chroma_planes = np.stack([source.chroma for source in ordered])
-    run_in_bands(height // 2, predict_chroma, chroma_planes, maps, shifts, weights, LINEAR, disparity, chroma)
+    run_in_bands(height // 2, predict_chroma, chroma_planes, maps, shifts, weights, TAPS, disparity, chroma)
     return Planes(y, chroma[0], chroma[1])
 
 
@@ -160,3 +161,13 @@ def _cubic_taps() -> NDArray[np.int64]:
 
 CUBIC = _cubic_taps()
 LINEAR = np.array([[128 - 8 * phase, 8 * phase] for phase in range(16)], np.int64)
+
+
+def _products() -> NDArray[np.int16]:
+    """The taps down times those to the right for each place between pixels, as the kernels ask for them."""
+    luma = np.einsum("yj,xi->yxji", CUBIC, CUBIC).reshape(-1, 16)
+    chroma = np.einsum("yj,xi->yxij", LINEAR, LINEAR).reshape(-1, 2, 1, 2).repeat(2, axis=2).reshape(-1, 8)
+    return np.hstack([luma, chroma]).astype(np.int16).ravel()
+
+
+TAPS = _products()
