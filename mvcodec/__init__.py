@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mvcodec.array import Calibration, CameraArray, Position, Viewpoint
     from mvcodec.capture.opening import open_input
+    from mvcodec.capture.reading import Reading
     from mvcodec.capture.source import ArraySource
+    from mvcodec.capture.timing import Timing
     from mvcodec.container.file_facts import StreamInfo, read_info
+    from mvcodec.container.limits import Limits
     from mvcodec.container.reader import McapReader
     from mvcodec.container.writer import McapWriter
     from mvcodec.decoding.decoder import Decoder
@@ -47,8 +50,11 @@ __version__ = "0.2.0"
 _MODULES = {
     "mvcodec.array": "Calibration CameraArray Position Viewpoint",
     "mvcodec.capture.opening": "open_input",
+    "mvcodec.capture.reading": "Reading",
     "mvcodec.capture.source": "ArraySource",
+    "mvcodec.capture.timing": "Timing",
     "mvcodec.container.file_facts": "StreamInfo read_info",
+    "mvcodec.container.limits": "Limits",
     "mvcodec.container.reader": "McapReader",
     "mvcodec.container.writer": "McapWriter",
     "mvcodec.decoding.decoder": "Decoder",
@@ -81,6 +87,7 @@ __all__ = [
     "EncoderConfig",
     "FrameSet",
     "InputError",
+    "Limits",
     "Matcher",
     "McapReader",
     "McapWriter",
@@ -96,6 +103,7 @@ __all__ = [
     "Plugin",
     "Position",
     "RateControl",
+    "Reading",
     "RenderedView",
     "SettingError",
     "StreamClosed",
@@ -103,6 +111,7 @@ __all__ = [
     "StreamHeader",
     "StreamInfo",
     "Synthesizer",
+    "Timing",
     "Video",
     "Viewpoint",
     "__version__",

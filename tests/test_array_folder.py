@@ -41,7 +41,7 @@ def test_real_cameras_are_read_unless_others_are_asked_for(tmp_path: Path) -> No
     source = open_input([make_folder(tmp_path)])
     assert set(next(source.frame_sets()).pictures) == {(0, 0), (0, 2), (1, 0), (1, 2)}
     assert set(next(source.frame_sets(views=[(0, 1)])).pictures) == {(0, 1)}
-    with pytest.raises(SettingError, match=r"view: found 2,0, expected a view of the 2x3 grid"):
+    with pytest.raises(SettingError, match=r"views: found 2,0, expected a view of the 2x3 grid"):
         source.frame_sets(views=[(2, 0)])
 
 

@@ -104,7 +104,7 @@ def test_pictures_that_occur_twice_are_told(tmp_path: Path) -> None:
         (("--qp", "60"), "--qp: found 60, expected an integer, 1..51"),
         (("--qp", "a"), "expected whole numbers such as 22,27,32,37"),
         (("--anchors", "best"), "--anchors: found best, expected some of simulcast, pvs"),
-        (("--anchor-codecs", "vp8"), "codec: found vp8, expected h264, hevc, av1"),
+        (("--anchor-codecs", "vp8"), "--anchor-codecs: found vp8, expected one of h264, hevc, av1"),
         (("--gop", "99"), "--gop: found 99, expected 1..10"),
         (("--synthesizer", "magic"), "synthesizer: found magic"),
         (("--frames", "7:"), "--frames: found 7:"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field
 from itertools import chain, product
 from typing import get_args
 
@@ -24,18 +24,18 @@ class RecordingSettings:
     """How a recording is read.
 
     Attributes:
-        topics: of every view of the grid, or of every `split` views, row by row.
         calibration: of all cameras; None: the recording's own, or nominal.
         offsets_ms: what is added to a topic's times.
-        real, fps, tolerance_ms, clock, bits, split, gaps: explained by their fields.
-        depth_topics: of the depth of every view, rows as `topics` has them; None: there is none.
+        topics, depth_topics, real, fps, tolerance_ms, clock, bits, split, gaps: explained by their fields.
         others: views beside the real cameras whose pictures are read too; None: all.
 
     Raises:
         SettingError: the grid is not one, names a topic twice, or a number is out of range.
     """
 
-    topics: TopicGrid
+    topics: TopicGrid = setting(
+        MISSING, "the video or image topic of every view, or of every `split` views, row by row"
+    )
     real: str = real_cameras()
     fps: float | None = nominal_fps()
     tolerance_ms: float | None = tolerance()
@@ -47,7 +47,10 @@ class RecordingSettings:
     )
     offsets_ms: Mapping[str, float] = field(default_factory=dict)
     bits: int | None = used_bits()
-    depth_topics: TopicGrid | None = None
+    depth_topics: TopicGrid | None = setting(
+        None,
+        "the depth topic of every view, rows as `topics` has them: 16UC1 (mm), 32FC1 (m) or compressedDepth",
+    )
     split: tuple[int, int] = views_in_pictures((1, 1))
     gaps: Gaps | None = gaps_field()
     others: Collection[Position] | None = ()

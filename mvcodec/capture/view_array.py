@@ -144,7 +144,7 @@ class ViewArray:
                 grid = f"a view of the {self.array.rows}x{self.array.cols} grid"
                 if position in self._views:
                     grid = "a real camera: the input was opened without `originals`"
-                raise SettingError("view", f"{position[0]},{position[1]}", grid)
+                raise SettingError("views", f"{position[0]},{position[1]}", grid)
         return self._read(numbers, chosen)
 
     def _read(self, numbers: range, positions: tuple[Position, ...]) -> Iterator[FrameSet]:

@@ -15,63 +15,27 @@ from mvcodec.stream import StreamHeader
 NEGATIVE_VALUES = ("--convergence", "--disparity-range", "--frames", "--max-depth", "--refocus", "--view")
 """Options whose value may begin with a minus sign."""
 
-OPTIONS = {
-    "viewpoint": "--view",
-    "when_behind": "--when-behind",
-    "synthesizer": "--synthesizer",
-    "grid": "--grid",
-    "frames": "--frames",
-    "calibration": "--calibration",
-    "qp": "--qp",
-    "crf": "--crf",
+OTHERWISE = {
     "bitrate_kbps": "--bitrate",
-    "target_psnr": "--target-psnr",
-    "disparity_qp": "--disparity-qp",
-    "disparity_range_px": "--disparity-range",
-    "disparity_scale": "--disparity-scale",
-    "disparity_cameras": "--disparity-cameras",
-    "disparity_median": "--disparity-median",
-    "gop": "--gop",
-    "matcher": "--matcher",
-    "preset": "--preset",
-    "speed": "--speed",
-    "prediction": "--prediction",
-    "enhance": "--enhance",
-    "enhance_views": "--enhance-views",
-    "enhance_chain": "--enhance-chain",
-    "codec": "--codec",
-    "threads": "--threads",
-    "anchors": "--anchors",
-    "bits": "--bits",
-    "gaps": "--gaps",
-    "board": "--board",
-    "board_input": "--board-input",
-    "clock": "--clock",
-    "focus_px": "--refocus",
     "convergence_px": "--convergence",
-    "format": "--format",
-    "fps": "--fps",
-    "host": "--host",
-    "interpolation": "--interpolation",
-    "live_view": "--live-view",
-    "nominal": "--nominal",
+    "disparity_range_px": "--disparity-range",
+    "focus_px": "--refocus",
     "offsets_ms": "--offset",
-    "path": "--path",
     "patience_s": "--patience",
-    "port": "--port",
     "qps": "--qp",
-    "real": "--real",
-    "rig": "--rig",
-    "scene": "--scene",
-    "seed": "--seed",
-    "size": "--size",
-    "split": "--split",
-    "sync": "--sync",
-    "style": "--style",
-    "tolerance_ms": "--tolerance-ms",
-    "topics": "--topics",
+    "viewpoint": "--view",
     "views": "--view",
 }
+"""Options that are called otherwise than the library's settings behind them."""
+
+AS_THEY_ARE = (
+    "anchor_codecs anchors bits board board_input calibration chunk_ms clock cluster codec crf "
+    "depth_topics disparity_cameras disparity_median disparity_qp disparity_scale enhance enhance_chain "
+    "enhance_views format fps frames gaps gop grid host incomplete interpolation live_view matcher "
+    "nominal on_error path port prediction preset qp real retries rig scene seed size speed split style "
+    "sync synthesizer target_psnr threads tolerance_ms topics when_behind"
+)
+OPTIONS = {name: f"--{name.replace('_', '-')}" for name in AS_THEY_ARE.split()} | OTHERWISE
 """The options behind the library's settings."""
 
 _SETTING = re.compile(r"(?<![-\w:.])\w+(?=$|,| )")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import re
 from pathlib import Path
 
-from mvcodec.cluster.connection import check_cluster
+from mvcodec.cli.setting_options import add_option
+from mvcodec.cluster.connection import RETRIES, check_cluster
 from mvcodec.errors import SettingError
 
 
@@ -20,13 +20,7 @@ def add_cluster(parser: argparse.ArgumentParser, default: str | None = None) -> 
         help="Dask workers that do the work: N processes of this machine, or those of a scheduler that is"
         f" running (default: {default or 'none, this process'})",
     )
-    parser.add_argument(
-        "--retries",
-        type=_retries,
-        default=2,
-        metavar="N",
-        help="how often a task is tried again whose worker died (default: %(default)s)",
-    )
+    add_option(parser, RETRIES)
 
 
 def place(text: str) -> Path | str:
@@ -39,9 +33,3 @@ def _cluster(text: str) -> str:
         return check_cluster(text)
     except SettingError as error:
         raise argparse.ArgumentTypeError(f"found {text!r}, expected {error.expected}") from None
-
-
-def _retries(text: str) -> int:
-    if not re.fullmatch(r"\d{1,3}", text):
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected a whole number")
-    return int(text)

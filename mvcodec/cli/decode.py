@@ -110,7 +110,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--follow", action="store_true", help="wait for more where the file ends, until it is complete"
     )
     add_frames(parser, "frames of the file to decode")
-    add_on_error(parser, "stop")
+    add_on_error(parser)
     add_limits(parser)
     add_overwrite(parser)
     add_output_options(parser, "print what was decoded, and how much of the input was read, as JSON")
@@ -223,7 +223,7 @@ def _open_sink(form: str, arguments: argparse.Namespace, plan: OutputPlan, outpu
     if form == MCAP:
         live = str(target) == STANDARD
         mcap = outputs.enter_context(
-            McapViews(standard_output() if live else target, plan, 0 if live else CHUNK_MS)
+            McapViews(standard_output() if live else target, plan, 0 if live else CHUNK_MS.default)
         )
         return lambda decoded, views: mcap.push(_pictures(views), decoded.index, decoded.time_ns)
     writer = outputs.enter_context(open_form(form, target, plan))

@@ -17,6 +17,7 @@ from mvcodec.capture.manifest import read_calibration
 from mvcodec.capture.recording import Recording
 from mvcodec.capture.recording_settings import RecordingSettings, TopicGrid
 from mvcodec.capture.sync_topics import with_offsets
+from mvcodec.cli.arguments import OPTIONS, in_options
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_options import add_patience, is_live, live_cameras
 from mvcodec.cli.live_view_option import live_view
@@ -52,16 +53,12 @@ class Unfinished(MvCodecError):
 def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
     """The options that recordings need."""
     group = parser.add_argument_group("recordings and live streams (an .mcap file, or -)")
-    group.add_argument(
-        "--topics",
-        metavar="T,T;T,T",
-        help="the video or image topic of every view: rows separated by ; or one list with --grid",
-    )
-    group.add_argument(
-        "--depth-topics",
-        metavar="T,T;T,T",
-        help="the depth topic of every view, for --matcher given: 16UC1 (mm), 32FC1 (m) or compressedDepth",
-    )
+    known = settings_of(RecordingSettings)
+    for name, note in (
+        ("topics", "; rows separated by ; or one list with --grid"),
+        ("depth_topics", f"; for --matcher {GIVEN}"),
+    ):
+        group.add_argument(OPTIONS[name], metavar="T,T;T,T", help=in_options(known[name].help) + note)
     add_setting(
         group,
         BehindSettings,
@@ -69,7 +66,7 @@ def add_stream_arguments(parser: argparse.ArgumentParser) -> None:
         left_open=True,
         note=f" (default: {BehindSettings().when_behind})",
     )
-    usual = settings_of(RecordingSettings)["clock"].default
+    usual = known["clock"].default
     add_setting(
         group,
         RecordingSettings,
@@ -113,7 +110,7 @@ def open_target(arguments: argparse.Namespace, view: LiveView | None) -> McapWri
     chunk_ms: int | None = arguments.chunk_ms
     if str(arguments.output) == STANDARD:
         return TalliedWriter(standard_output(), 0 if chunk_ms is None else chunk_ms, view)
-    return McapWriter(arguments.output, CHUNK_MS if chunk_ms is None else chunk_ms, view)
+    return McapWriter(arguments.output, CHUNK_MS.default if chunk_ms is None else chunk_ms, view)
 
 
 def encode_stream(
@@ -175,7 +172,7 @@ def _opened(arguments: argparse.Namespace) -> Iterator[Recording | LiveCameras]:
         raise SettingError("sync", "audio with a recording", "motion: a recording's topics have no sound")
     timing, split = timing_of(arguments), arguments.split or (1, 1)
     settings = RecordingSettings(
-        topics=_topic_grid("--topics", arguments.topics, arguments.grid, split),
+        topics=_topic_grid("topics", arguments.topics, arguments.grid, split),
         real=arguments.real,
         fps=timing.fps,
         tolerance_ms=timing.tolerance_ms,
@@ -216,25 +213,25 @@ def _depth_grid(arguments: argparse.Namespace) -> TopicGrid | None:
     if arguments.depth_topics is None:
         return None
     if str(arguments.matcher).split(":")[0] != GIVEN:
-        raise SettingError("--depth-topics", arguments.depth_topics, f"--matcher {GIVEN}, which codes them")
-    return _topic_grid("--depth-topics", arguments.depth_topics, arguments.grid)
+        raise SettingError("depth_topics", arguments.depth_topics, f"--matcher {GIVEN}, which codes them")
+    return _topic_grid("depth_topics", arguments.depth_topics, arguments.grid)
 
 
 def _topic_grid(
-    option: str, text: str | None, grid: tuple[int, int] | None, split: tuple[int, int] = (1, 1)
+    setting: str, text: str | None, grid: tuple[int, int] | None, split: tuple[int, int] = (1, 1)
 ) -> TopicGrid:
     if text is None:
-        raise SettingError(option, "nothing", "the topic of every view, such as '/a,/b;/c,/d'")
+        raise SettingError(setting, "nothing", "the topic of every view, such as '/a,/b;/c,/d'")
     rows = tuple(tuple(topic.strip() for topic in row.split(",")) for row in text.strip(";").split(";"))
     if not all(all(row) for row in rows):
-        raise SettingError(option, repr(text), "a topic for every view, such as '/a,/b;/c,/d'")
+        raise SettingError(setting, repr(text), "a topic for every view, such as '/a,/b;/c,/d'")
     if grid is None:
         return rows
     names = [name for row in rows for name in row]
     cols = grid[1] // split[1]
     if len(names) * split[0] * split[1] != grid[0] * grid[1] or grid[0] % split[0] or grid[1] % split[1]:
         each = f" of {split[0]}x{split[1]} views each" * (split != (1, 1))
-        raise SettingError(option, f"{len(names)} topics{each}", f"{grid[0]}x{grid[1]} views as --grid says")
+        raise SettingError(setting, f"{len(names)} topics{each}", f"{grid[0]}x{grid[1]} views as --grid says")
     return tuple(tuple(names[at : at + cols]) for at in range(0, len(names), cols))
 
 

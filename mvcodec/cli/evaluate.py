@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from mvcodec.array import CameraArray
 from mvcodec.capture import open_input, resolve_frames
-from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, positive_int
+from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, codec_name, positive_int
 from mvcodec.cli.cluster_options import add_cluster, place
 from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
 from mvcodec.cli.layer_options import add_layer, layer_settings
@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--anchor-codecs",
-        type=_names,
+        type=_codecs,
         metavar="NAME,..",
         help=f"codecs of the anchors, some of {', '.join(CODECS)} (default: {', '.join(ANCHOR_CODECS)})",
     )
@@ -184,6 +184,10 @@ def _names(text: str) -> tuple[str, ...]:
     if not names:
         raise argparse.ArgumentTypeError(f"found {text!r}, expected names between commas")
     return names
+
+
+def _codecs(text: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(map(codec_name, _names(text))))
 
 
 def _cell(value: float | None, form: str) -> str:

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--nominal", action="store_true", help="accept nominal calibration")
     add_matcher(parser)
     add_frames(parser, "frames of the file to export")
-    add_on_error(parser, "stop")
+    add_on_error(parser)
     add_limits(parser)
     add_overwrite(parser)
     add_output_options(parser)

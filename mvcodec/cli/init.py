@@ -6,11 +6,13 @@ import argparse
 import json
 from pathlib import Path
 
-from mvcodec.capture.manifest import MANIFEST_NAME
+from mvcodec.capture.manifest import DEFAULT_FPS, MANIFEST_NAME
 from mvcodec.capture.numbered_files import FoundViews, find_views
-from mvcodec.cli.arguments import pair_of_sizes, positive_number
+from mvcodec.capture.timing import Timing
+from mvcodec.cli.arguments import pair_of_sizes
 from mvcodec.cli.info import count
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
+from mvcodec.cli.setting_options import add_setting
 from mvcodec.output.atomic import write_bytes
 
 
@@ -26,9 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--grid", type=pair_of_sizes, metavar="RxC", help="needed where names have one number for the camera"
     )
-    parser.add_argument(
-        "--fps", type=positive_number, metavar="N", help="frame sets a second of pictures (default: 15)"
-    )
+    add_setting(parser, Timing, "fps", left_open=True, note=f" (default: {DEFAULT_FPS:g})")
     add_overwrite(parser)
     parser.add_argument("--quiet", action="store_true", help="no summary")
 

@@ -17,7 +17,7 @@ def add_picture_options(parser: argparse.ArgumentParser) -> None:
     add_setting(parser, Reading, "bits")
     add_setting(parser, Reading, "gaps")
     add_setting(parser, Reading, "split", parse=pair_of_sizes, metavar="RxC")
-    add_on_error(parser, "stop", "at a picture that cannot be read: leave its frame set out, or stop")
+    add_on_error(parser, what="at a picture that cannot be read: leave its frame set out, or stop")
 
 
 def reading_of(arguments: argparse.Namespace) -> Reading:

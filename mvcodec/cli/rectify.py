@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from mvcodec.capture import ArraySource, open_input, resolve_frames
-from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes
+from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes, picture_size
 from mvcodec.cli.paths import (
     ARRAY_NAMES,
     add_overwrite,
@@ -92,7 +92,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="common",
         help="common: what all cameras see; all: full size with black borders (default: %(default)s)",
     )
-    parser.add_argument("--size", type=pair_of_sizes, metavar="WxH", help="of the rectified pictures, px")
+    parser.add_argument(
+        "--size", type=picture_size, metavar="WxH", help="of the rectified pictures, px, or a word as 720p"
+    )
     parser.add_argument(
         "--match-colours",
         action=argparse.BooleanOptionalAction,

@@ -73,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_matcher(parser)
     add_no_enhancement(parser)
     add_frames(parser, "frames of the file")
-    add_on_error(parser, "stop")
+    add_on_error(parser)
     add_limits(parser)
     add_overwrite(parser)
     add_output_options(parser)

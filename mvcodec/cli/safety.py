@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import re
+from dataclasses import replace
 
-from mvcodec.container.chunked_file import CHUNK_MS, MAX_CHUNK_MS
+from mvcodec.cli.setting_options import add_option
+from mvcodec.container.chunked_file import CHUNK_MS
 from mvcodec.container.limits import Limits
+from mvcodec.decoding.decoder import ON_ERROR, OnError
 from mvcodec.errors import SettingError
 from mvcodec.settings import did_you_mean, settings_of
 
@@ -45,30 +47,14 @@ def limits_of(arguments: argparse.Namespace) -> Limits:
 
 def add_on_error(
     parser: argparse.ArgumentParser,
-    default: str,
-    what: str = "at damage: go on with the next keyframe, or stop",
+    default: OnError = ON_ERROR.default,
+    what: str = ON_ERROR.help,
 ) -> None:
     """``--on-error skip|stop``."""
-    parser.add_argument(
-        "--on-error",
-        choices=("skip", "stop"),
-        default=default,
-        help=f"{what} (default: {default})",
-    )
+    add_option(parser, replace(ON_ERROR, default=default, help=what))
 
 
 def add_chunk_ms(parser: argparse.ArgumentParser) -> None:
     """``--chunk-ms N``."""
-    parser.add_argument(
-        "--chunk-ms",
-        type=_chunk_ms,
-        metavar="N",
-        help="stream time that waits before it is written, which is what a power cut can lose;"
-        f" 0 writes each frame set at once (default: {CHUNK_MS}, on standard output 0)",
-    )
-
-
-def _chunk_ms(text: str) -> int:
-    if not re.fullmatch(r"\d{1,9}", text) or int(text) > MAX_CHUNK_MS:
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected 0..{MAX_CHUNK_MS} ms")
-    return int(text)
+    note = f" (default: {CHUNK_MS.default}, on standard output 0)"
+    add_option(parser, CHUNK_MS, left_open=True, note=note)

@@ -26,18 +26,30 @@ def add_setting(
     left_open: bool = False,
     note: str = "",
 ) -> None:
+    """Add the option of one field of a settings dataclass; arguments as `add_option`'s."""
+    known = settings_of(settings)[name]
+    add_option(group, known, parse=parse, metavar=metavar, left_open=left_open, note=note)
+
+
+def add_option(
+    group: argparse._ActionsContainer,
+    known: Setting,
+    *,
+    parse: Callable[[str], Any] | None = None,
+    metavar: str | None = None,
+    left_open: bool = False,
+    note: str = "",
+) -> None:
     """Add the option of one setting, which is called as `OPTIONS` says.
 
     Args:
-        group: a parser or a group of its options.
-        settings: the dataclass that the setting is a field of.
-        name: of the field, and of what the parser gives for it.
+        group: a parser or a group of its options; it gives the value under the setting's name.
+        known: the setting.
         parse: text to value, where the command line takes other words than the library.
         metavar: what stands for the value; by default made from the choices or the type.
         left_open: what counts where the option is not given is the command's to say, in `note`.
         note: what only the command line has to say of it, before the default.
     """
-    known = settings_of(settings)[name]
     given = None if known.choices is None else [show(choice) for choice in known.choices]
     shown = given is not None and len(given) <= MOST_SHOWN
     meaning, sign, default = known.help.partition(" (default: ")
@@ -48,8 +60,8 @@ def add_setting(
     elif known.default is not None:
         sign, default = " (default: ", f"{show(known.default)})"
     group.add_argument(
-        OPTIONS[name],
-        dest=name,
+        OPTIONS[known.name],
+        dest=known.name,
         type=reader(known, parse, AUTO if parse is None and (metavar or "").endswith(f"|{AUTO}") else None),
         default=None if left_open else known.default,
         metavar=metavar or ("|".join(given or ()) if shown else _kind(known)),

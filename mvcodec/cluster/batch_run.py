@@ -17,6 +17,7 @@ from typing import Any
 
 import mvcodec
 from mvcodec.cluster.batch_inputs import Recording
+from mvcodec.cluster.connection import RETRIES
 from mvcodec.cluster.frame_segments import cut
 from mvcodec.cluster.places import Place
 from mvcodec.cluster.tasks import PART, Outcome, join_parts, run_command
@@ -51,7 +52,7 @@ class Batch:
     output: Place
     ending: str
     segment_s: float | None = None
-    retries: int = 2
+    retries: int = RETRIES.default
     overwrite: bool = False
     threads: int | None = None
 

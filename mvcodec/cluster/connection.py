@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from mvcodec.errors import InputError, MissingExtra, SettingError
+from mvcodec.settings import Setting
 
 EXTRA = "cluster"
 
@@ -17,6 +18,8 @@ _LOCAL = re.compile(r"local(?::([1-9]\d{0,3}))?")
 _SCHEDULER = re.compile(r"(?:tcp|tls|ws|wss|ucx)://\S+")
 
 CONNECT_SECONDS = 10
+
+RETRIES = Setting("retries", int, 2, "how often a task is tried again whose worker died", low=0, high=999)
 
 
 def check_cluster(text: str) -> str:
@@ -42,8 +45,8 @@ def connected(cluster: str, retries: int) -> Iterator[Any]:
 
     Args:
         cluster: ``local`` (one worker a core), ``local:N``, or the address of a scheduler.
-        retries: how often a local worker may die at one task before that counts as failed; a scheduler
-            that is running has its own setting, `distributed.scheduler.allowed-failures`.
+        retries: see `RETRIES`; so often may a local worker die at one task before that counts as failed. A
+            scheduler that is running has its own setting, `distributed.scheduler.allowed-failures`.
 
     Raises:
         SettingError: it names no cluster.

@@ -13,15 +13,21 @@ from typing import TYPE_CHECKING, BinaryIO, Protocol
 from mcap.writer import CompressionType, Writer
 
 import mvcodec
-from mvcodec.errors import OutputError, SettingError
+from mvcodec.errors import OutputError
+from mvcodec.settings import Setting
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-CHUNK_MS = 500
-"""The most stream time that a chunk holds by default, hence what a power cut can lose."""
-
-MAX_CHUNK_MS = 60_000
+CHUNK_MS = Setting(
+    "chunk_ms",
+    int,
+    500,
+    "stream time that waits before it is written, ms, which is what a power cut can lose; 0 writes each frame"
+    " set at once",
+    low=0,
+    high=60_000,
+)
 
 FULL_CHUNK_BYTES = 1 << 26
 """A chunk ends when it holds so much, well below what readers take."""
@@ -51,7 +57,7 @@ class ChunkedFile:
     Args:
         target: path, or an open binary file, which may be a pipe and stays open.
         chunk_ms: the most stream time that waits before it is written, 0..60000; with 0 each
-            frame set is written at once.
+            frame set is written at once. See `CHUNK_MS`.
         listener: hears of all that is written.
 
     Raises:
@@ -60,10 +66,12 @@ class ChunkedFile:
     """
 
     def __init__(
-        self, target: BinaryIO | Path, chunk_ms: int = CHUNK_MS, listener: MessageListener | None = None
+        self,
+        target: BinaryIO | Path,
+        chunk_ms: int = CHUNK_MS.default,
+        listener: MessageListener | None = None,
     ) -> None:
-        if not 0 <= chunk_ms <= MAX_CHUNK_MS:
-            raise SettingError("chunk_ms", chunk_ms, f"0..{MAX_CHUNK_MS} ms")
+        CHUNK_MS.check(chunk_ms)
         self._chunk_ns = chunk_ms * 1_000_000
         self._target, self._listener = target, listener
         name = target if isinstance(target, Path) else getattr(target, "name", "output")

@@ -33,7 +33,7 @@ class VideoTopicsWriter(Closing):
         array: CameraArray,
         views: dict[str, Viewpoint],
         codec: str,
-        chunk_ms: int = CHUNK_MS,
+        chunk_ms: int = CHUNK_MS.default,
     ) -> None:
         self._file = ChunkedFile(target, chunk_ms)
         self._format = foxglove_name(codec)

@@ -36,7 +36,7 @@ class McapWriter(Closing):
     def __init__(
         self,
         target: BinaryIO | str | os.PathLike[str],
-        chunk_ms: int = CHUNK_MS,
+        chunk_ms: int = CHUNK_MS.default,
         listener: MessageListener | None = None,
     ) -> None:
         file = Path(target) if isinstance(target, str | os.PathLike) else target

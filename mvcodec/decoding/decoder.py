@@ -28,12 +28,20 @@ from mvcodec.decoding.tracks import Tracks
 from mvcodec.enhancement import LAYER_TRACK, EnhancementHeader
 from mvcodec.errors import MvCodecWarning, SettingError, StreamClosed, StreamError
 from mvcodec.frames import DecodedSet, DisparityMap, Picture
+from mvcodec.settings import Setting
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, view_name
 from mvcodec.video.colour import to_picture
 from mvcodec.workers import check_threads
 
 OnError = Literal["skip", "stop"]
+ON_ERROR = Setting(
+    "on_error",
+    str,
+    "stop",
+    "at damage: go on with the next keyframe, or stop",
+    choices=get_args(OnError),
+)
 
 
 class Decoder(Closing):
@@ -69,8 +77,7 @@ class Decoder(Closing):
         threads: int | None = None,
         enhanced: Collection[Position] | None = (),
     ) -> None:
-        if on_error not in get_args(OnError):
-            raise SettingError("on_error", on_error, " or ".join(get_args(OnError)))
+        ON_ERROR.check(on_error)
         self._on_error, self._limits, self._asked_matcher = on_error, limits, matcher
         self._matcher: Matcher | None = None
         self._header: StreamHeader | None = None

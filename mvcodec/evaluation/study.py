@@ -65,7 +65,7 @@ class Study:
             if name not in ANCHORS:
                 raise SettingError("anchors", name, f"some of {', '.join(ANCHORS)}")
         for name in self.anchor_codecs:
-            find_codec(name)
+            find_codec(name, "anchor_codecs")
         for qp in self.qps:
             replace(self.config, qp=qp)
 

@@ -16,10 +16,10 @@ CODECS: dict[str, Codec] = {"h264": H264, "hevc": HEVC, "av1": AV1, "vp9": VP9}
 ANCHOR_CODECS = tuple(name for name, codec in CODECS.items() if codec.anchor)
 
 
-def find_codec(name: str) -> Codec:
-    """The codec of a name; SettingError names the choices."""
+def find_codec(name: str, setting: str = "codec") -> Codec:
+    """The codec of a name; SettingError names the setting and the choices."""
     if name not in CODECS:
-        raise SettingError("codec", name, ", ".join(CODECS))
+        raise SettingError(setting, name, f"one of {', '.join(CODECS)}")
     return CODECS[name]
 
 
