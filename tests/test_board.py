@@ -131,6 +131,24 @@ def test_cameras_are_found_whose_lenses_are_of_either_model(model: str) -> None:
     assert first.focal_px[0] == pytest.approx(true.focal_px[0], rel=0.01)
 
 
+@pytest.mark.parametrize(
+    ("text", "model", "near_m"),
+    [(CHARUCO, "pinhole", 0.55), (CHESSBOARD, "pinhole", 0.5), (CHARUCO, "fisheye", 0.16)],
+)
+def test_cameras_are_found_from_rendered_pictures_of_a_board(text: str, model: str, near_m: float) -> None:
+    board, known = Board.from_text(text), cameras(1, 2, model)
+    at = ((0, 0), (0, 1))
+    sets = [
+        FrameSet(n, n, {a: seen_by(camera, board, turn, shift) for a, camera in zip(at, known, strict=True)})
+        for n, (turn, shift) in enumerate(held(10, 5, (-0.06, -0.06, near_m)))
+    ]
+    found = cameras_from_board(find_board(board, sets, at, SIZE), "board")
+    turn_deg, place_m = errors(found.cameras, known)
+    assert found.cameras[0].lens.model == model
+    assert turn_deg < 0.3
+    assert place_m < 0.003
+
+
 def test_overlapping_groups_of_cameras_are_enough() -> None:
     known = cameras()
     sightings = sightings_of(known, Board.from_text(CHARUCO), 30)

@@ -190,10 +190,7 @@ def test_nothing_is_said_of_real_arrays(name: str) -> None:
 MIDDLE = (1, 1)
 
 
-@pytest.mark.parametrize("kind", ["dark", "blank", "mirrored", "alone"])
-def test_a_camera_that_fits_no_other_is_told_with_the_reason(kind: str) -> None:
-    array, pictures = room(3, 3)
-    picture = pictures[MIDDLE]
+def odd(picture: Picture, kind: str) -> Picture:
     elsewhere = np.random.default_rng(0).integers(0, 256, (18, 32, 3), np.uint8)
     made = {
         "dark": picture // 32,
@@ -201,9 +198,15 @@ def test_a_camera_that_fits_no_other_is_told_with_the_reason(kind: str) -> None:
         "mirrored": np.ascontiguousarray(picture[:, ::-1]),
         "alone": np.asarray(cv2.resize(elsewhere, SIZE), np.uint8),
     }
+    return made[kind]
+
+
+@pytest.mark.parametrize("kind", ["dark", "blank", "mirrored", "alone"])
+def test_a_camera_that_fits_no_other_is_told_with_the_reason(kind: str) -> None:
+    array, pictures = room(3, 3)
     whole = replace(array, real_rows=(0, 1, 2), real_cols=(0, 1, 2))
     assert look_at(whole, pictures) == []
-    (concern,) = look_at(whole, pictures | {MIDDLE: made[kind]})
+    (concern,) = look_at(whole, pictures | {MIDDLE: odd(pictures[MIDDLE], kind)})
     assert concern.kind == kind
     assert "camera 1,1" in concern.text
 
@@ -214,3 +217,22 @@ def test_rectify_tells_of_another_order(tmp_path: Path) -> None:
     done = mvcodec("rectify", folder, tmp_path / "rig.json")
     assert done.returncode == 0
     assert "columns swapped" in done.stderr
+
+
+def test_rectify_with_strict_stops_at_another_order(tmp_path: Path) -> None:
+    _, pictures = room()
+    folder = write(tmp_path, shown(pictures, COLUMNS))
+    out = tmp_path / "rig.json"
+    assert "columns swapped" in fails(1, "rectify", folder, out, "--strict")
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("kind", ["dark", "blank", "mirrored", "alone"])
+@pytest.mark.parametrize("grid", [(1, 2), (1, 3)])
+def test_one_of_a_few_cameras_that_fits_no_other_is_told(grid: tuple[int, int], kind: str) -> None:
+    array, pictures = room(*grid)
+    whole = replace(array, real_cols=tuple(range(grid[1])))
+    assert look_at(whole, pictures) == []
+    (concern,) = look_at(whole, pictures | {(0, 1): odd(pictures[0, 1], kind)})
+    assert concern.kind == kind
+    assert "0,1" in concern.text

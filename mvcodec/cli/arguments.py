@@ -86,6 +86,9 @@ def pair_of_sizes(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
+MOST_FOV_DEG = 150.0
+"""Wider lenses are fisheyes."""
+
 COMMON_SIZES = {"480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080), "1440p": (2560, 1440)}
 COMMON_SIZES |= dict.fromkeys(("4k", "2160p"), (3840, 2160))
 
@@ -152,6 +155,14 @@ def positive_number(text: str) -> float:
         number = math.nan
     if not number > 0:
         raise argparse.ArgumentTypeError(f"found {text!r}, expected a number above 0")
+    return number
+
+
+def field_of_view(text: str) -> float:
+    """Degrees, as a flat picture can have them."""
+    number = positive_number(text)
+    if not number <= MOST_FOV_DEG:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected degrees up to {MOST_FOV_DEG:g}")
     return number
 
 

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 from mvcodec.capture import ArraySource, open_input, resolve_frames
-from mvcodec.cli.arguments import add_frames, add_output_options, pair_of_sizes, picture_size
+from mvcodec.cli.arguments import (
+    add_frames,
+    add_output_options,
+    field_of_view,
+    pair_of_sizes,
+    picture_size,
+    positive_number,
+)
 from mvcodec.cli.paths import (
     ARRAY_NAMES,
     add_overwrite,
@@ -72,6 +80,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="of the cameras in row order: Kalibr, EuRoC or ROS YAML; or one RIG.json",
     )
+    lens = parser.add_mutually_exclusive_group()
+    lens.add_argument(
+        "--focal",
+        type=positive_number,
+        metavar="PX",
+        help="focal length of the cameras in pixels, with --from scene (default: found, near the width)",
+    )
+    lens.add_argument(
+        "--fov",
+        type=field_of_view,
+        metavar="DEG",
+        help="the same by the angle of view from left to right that the lens has without its distortion",
+    )
     parser.add_argument("--board", metavar="BOARD", help=f"what was filmed: {EXPECTED}")
     parser.add_argument(
         "--board-input",
@@ -108,6 +129,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="between pixels (default: %(default)s)",
     )
     parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="stop where cameras stand in another order, show something else, or are late",
+    )
+    parser.add_argument(
         "--report", type=local_path, metavar="rig.html", help="write a page with figures and pictures"
     )
     add_frames(parser, "frames of the input to use")
@@ -129,8 +155,8 @@ def run(arguments: argparse.Namespace) -> None:
     timing = timing_of(arguments)
     source = open_input(arguments.input, grid=arguments.grid, real="all", timing=timing)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
-    tell_delays(source, chosen, arguments)
-    tell_order(source, chosen)
+    tell_delays(source, chosen, arguments, strict=arguments.strict)
+    tell_order(source, chosen, strict=arguments.strict)
     found = _calibrated(source, chosen, arguments)
     text = rig_text(found.rig)
     if output.suffix.lower() == ".json":
@@ -158,13 +184,27 @@ def _calibrated(source: ArraySource, chosen: range, arguments: argparse.Namespac
         found = f"{len(arguments.calibration or [])} files with --from {way}"
         raise SettingError("calibration", found, "--from file, and the files of the cameras in row order")
     wishes = Wishes(arguments.crop, arguments.size)
+    focal_px = _focal_px(source, arguments)
+    if focal_px is not None and way != "scene":
+        raise SettingError("focal", f"one with --from {way}", "--from scene: others say it themselves")
     if way == "file":
         return calibrate_from_files(source, chosen, arguments.calibration, wishes)
     if way == "board":
         shown = _board_source(source, arguments)
         sightings = _sightings(Board.from_text(arguments.board), shown, quiet=arguments.quiet)
         return calibrate_from_board(source, chosen, sightings, shown.name, arguments.lens, wishes)
-    return calibrate_from_scene(source, chosen, wishes)
+    return calibrate_from_scene(source, chosen, wishes, focal_px)
+
+
+def _focal_px(source: ArraySource, arguments: argparse.Namespace) -> float | None:
+    """What `--focal` or `--fov` says; None without."""
+    width = source.array.width
+    if arguments.fov is not None:
+        return width / 2 / math.tan(math.radians(arguments.fov) / 2)
+    focal_px: float | None = arguments.focal
+    if focal_px is not None and not width / 10 <= focal_px <= 100 * width:
+        raise SettingError("focal", f"{focal_px:g}", f"{width / 10:g} to {100 * width} px")
+    return focal_px
 
 
 def _board_source(source: ArraySource, arguments: argparse.Namespace) -> ArraySource:

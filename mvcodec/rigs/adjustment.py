@@ -109,6 +109,8 @@ def adjust(
     size: tuple[int, int],
     focal_px: float,
     priors: Priors | None = None,
+    *,
+    focal_known: bool = False,
 ) -> Adjusted:
     """Cameras that explain the points best, robustly.
 
@@ -118,8 +120,9 @@ def adjust(
         size: (width, height) of the pictures, px.
         focal_px: what the focal length is expected to be.
         priors: how sure all that is.
+        focal_known: the cameras' mean focal length is `focal_px`.
     """
-    problem = _Problem(grid, size, focal_px, priors or Priors())
+    problem = _Problem(grid, size, focal_px, priors or Priors(), focal_known=focal_known)
     values = np.zeros(problem.unknowns)
     noise_px, bound_px = 2.0, 8.0
     for most in _OBSERVATIONS:
@@ -154,14 +157,23 @@ def _thinned(tracks: Tracks, most: int) -> Tracks:
 class _Problem:
     """The unknowns of a rig as one vector, in units of their priors' standard deviations."""
 
-    def __init__(self, grid: Vectors, size: tuple[int, int], focal_px: float, priors: Priors) -> None:
+    def __init__(
+        self,
+        grid: Vectors,
+        size: tuple[int, int],
+        focal_px: float,
+        priors: Priors,
+        *,
+        focal_known: bool = False,
+    ) -> None:
         self._grid, self._focal_px, self._priors = grid, focal_px, priors
         self._centre = (np.array(size, np.float64) - 1) / 2
         self._count = len(grid)
         # In a single column steps down are what the unit is.
         self._heights = grid[:, 1] * bool(np.ptp(grid[:, 0]))
         p = priors
-        self._shared = np.array([p.focal, p.k1, p.k2, p.stretch])
+        self._focal_known = focal_known
+        self._shared = np.array([0 if focal_known else p.focal, p.k1, p.k2, p.stretch])
         self._each = np.array(
             [p.angle_rad] * 3
             + [p.focal_each, p.k1_each, p.k2_each]
@@ -176,7 +188,7 @@ class _Problem:
 
         The axes, the steps and the origin are those of the grid that the cameras stand on: their
         displacements don't turn, stretch or move it. A single line of cameras says nothing of turns
-        around itself: the mean one is 0.
+        around itself: the mean one is 0. A focal length that is known is the cameras' mean one.
         """
         x, y = (self._grid - self._grid.mean(axis=0)).T
         rows = []
@@ -194,6 +206,10 @@ class _Problem:
                 each = np.zeros((self._count, _EACH))
                 each[:, 6:9] = displacement
                 rows.append(np.concatenate([np.zeros(_SHARED), each.ravel()]) * 100)
+        if self._focal_known:
+            each = np.zeros((self._count, _EACH))
+            each[:, 3] = 100
+            rows.append(np.concatenate([np.zeros(_SHARED), each.ravel()]))
         for axis, across in ((0, y), (1, x)):
             if not np.any(across):
                 each = np.zeros((self._count, _EACH))

@@ -75,13 +75,16 @@ class Calibrated:
         )
 
 
-def calibrate_from_scene(source: ArraySource, chosen: range, wishes: Wishes | None = None) -> Calibrated:
+def calibrate_from_scene(
+    source: ArraySource, chosen: range, wishes: Wishes | None = None, focal_px: float | None = None
+) -> Calibrated:
     """Find a rig from the scene alone.
 
     Args:
         source: the input, all of whose cameras are looked at.
         chosen: frame numbers to look at some of.
         wishes: what the rectified pictures shall be.
+        focal_px: of the cameras, where it is known.
 
     Raises:
         InputError: the cameras share too little.
@@ -94,7 +97,9 @@ def calibrate_from_scene(source: ArraySource, chosen: range, wishes: Wishes | No
     check_shared(every, source.name)
     grid = np.array([(col, row * array.rho) for row, col in array.positions], np.float64)
     size = array.width, array.height
-    adjusted = adjust(finer(every, frame_sets), grid, size, array.calibration.fx_px)
+    known = focal_px is not None
+    expected = array.calibration.fx_px if focal_px is None else focal_px
+    adjusted = adjust(finer(every, frame_sets), grid, size, expected, focal_known=known)
     rig = rig_from_adjusted(array, adjusted, wishes.crop, wishes.size)
     return _finished(rig, frame_sets, every, adjusted.tracks, pairs)
 
