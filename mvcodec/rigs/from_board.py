@@ -191,8 +191,12 @@ def _calibrated(
     pictures = [sightings.xy_px[frame, number, seen[frame]].astype(np.float32)[None] for frame in frames]
     size, empty = sightings.size, np.eye(3)
     if model == "fisheye":
-        flags = _fisheye_flag("CALIB_RECOMPUTE_EXTRINSIC") | _fisheye_flag("CALIB_FIX_SKEW")
-        told = cv2.fisheye.calibrate(objects, pictures, size, empty, np.zeros(4), flags=flags)
+        names = ("CALIB_RECOMPUTE_EXTRINSIC", "CALIB_FIX_SKEW", "CALIB_USE_INTRINSIC_GUESS")
+        flags = sum(map(_fisheye_flag, names))
+        # A lens that sees 180 degrees: from OpenCV's own guess, a longer one, wide lenses often fail.
+        guess = np.diag([max(size) / np.pi, max(size) / np.pi, 1.0])
+        guess[:2, 2] = (np.array(size) - 1) / 2
+        told = cv2.fisheye.calibrate(objects, pictures, size, guess, np.zeros(4), flags=flags)
     else:
         told = cv2.calibrateCamera(objects, pictures, size, empty, np.zeros(5), flags=cv2.CALIB_FIX_K3)
     rms, matrix, bent, turns, shifts = told
