@@ -270,4 +270,6 @@ def test_an_encoder_killed_at_50_random_moments_loses_one_chunk_at_most(tmp_path
 
 
 def test_chunk_ms_bounds_what_waits(tmp_path: Path) -> None:
-    assert "expected 0..60000 ms" in fails(2, "encode", tmp_path, tmp_path / "x.mcap", "--chunk-ms", "60001")
+    assert "expected a whole number of ms, 0..60000" in fails(
+        2, "encode", tmp_path, tmp_path / "x.mcap", "--chunk-ms", "60001"
+    )

@@ -27,6 +27,7 @@ CHUNK_MS = Setting(
     " set at once",
     low=0,
     high=60_000,
+    expected="a whole number of ms, 0..60000",
 )
 
 FULL_CHUNK_BYTES = 1 << 26
