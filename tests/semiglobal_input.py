@@ -42,6 +42,7 @@ def joint_costs(
     planes: NDArray[np.uint8],
     census: NDArray[np.uint8],
     bounds: NDArray[np.uint8],
+    blind: NDArray[np.uint8],
     across: NDArray[np.bool_],
     steps: NDArray[np.float32],
     *,
@@ -65,6 +66,7 @@ def joint_costs(
         with_borders(census),
         across,
         with_borders(bounds),
+        with_borders(blind),
         width,
         steps,
         low,
@@ -78,9 +80,16 @@ def joint_costs(
 
 
 def uniform_costs(
-    differences: list[int], bits: list[int], steps: list[tuple[float, float]], lone_cost: int = 6
+    differences: list[int],
+    bits: list[int],
+    steps: list[tuple[float, float]],
+    lone_cost: int = 6,
+    blind_rows: int = 0,
 ) -> NDArray[np.uint8]:
-    """Volume (1, 6, 3), low 0, where a partner differs by so much grey a channel and so many census bits."""
+    """Volume (1, 6, 3), low 0, where a partner differs by so much grey a channel and so many census bits.
+
+    Partners stand along rows, where they are `blind_rows` blind, but for those below.
+    """
     cameras = 1 + len(steps)
     bounds = np.full((2, cameras, 1, 2, 3, 6), 100, np.uint8)
     census = np.zeros((cameras, 1, 8, 6), np.uint8)
@@ -89,5 +98,7 @@ def uniform_costs(
         census[camera] = np.packbits(np.arange(64) < count)[None, :, None]
     planes = np.full((cameras, 1, 3, 6), 100, np.uint8)
     where = np.array(steps, np.float32)
-    across = np.ones(len(steps), np.bool_)
-    return joint_costs(planes, census, bounds, across, where, low=0, lone_cost=lone_cost, levels=3)
+    blind = np.zeros((2, 1, 6), np.uint8)
+    blind[0] = blind_rows
+    across = where[:, 1] == 0
+    return joint_costs(planes, census, bounds, blind, across, where, low=0, lone_cost=lone_cost, levels=3)

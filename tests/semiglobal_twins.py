@@ -59,6 +59,7 @@ def joint_costs(
     planes: Bytes,
     census: Bytes,
     bounds: Bytes,
+    blind: Bytes,
     across: NDArray[np.bool_],
     steps: NDArray[np.float32],
     low: int,
@@ -71,21 +72,21 @@ def joint_costs(
     height, width = planes.shape[1], planes.shape[3]
     volume = np.empty((height, width, levels), np.uint8)
     for y, x, level in np.ndindex(volume.shape):
-        found = []
+        plain, found = [], []
         for partner, (by_x, by_y) in enumerate(steps, 1):
             u, v = x - round(float(by_x) * (low + level)), y - round(float(by_y) * (low + level))
             if 0 <= u < width and 0 <= v < height:
-                interval = bounds[0 if across[partner - 1] else 1, partner, v, :, :, u]
-                there = census[partner, v, :, u]
-                found.append(pair_cost(planes[0, y, :, x], census[0, y, :, x], interval, there, limits))
+                side = 0 if across[partner - 1] else 1
+                interval, there = bounds[side, partner, v, :, :, u], census[partner, v, :, u]
+                plain.append(pair_cost(planes[0, y, :, x], census[0, y, :, x], interval, there, limits))
+                found.append(plain[-1] + int(blind[side, y, x]))
         found.sort()
         if not found:
             volume[y, x, level] = outside_cost
-        elif len(steps) == 1:
-            volume[y, x, level] = found[0]
-        else:
-            pair = [(found[0] + found[1] + 1) // 2] if len(found) > 1 else []
-            volume[y, x, level] = min([found[0] + lone_cost, *pair])
+            continue
+        alone = lone_cost if len(steps) > 1 else 0
+        other = (found[0] + found[1] + 1) // 2 if len(found) > 1 else max(plain[0] + alone, outside_cost - 10)
+        volume[y, x, level] = min(found[0] + alone, other)
     return volume
 
 

@@ -18,6 +18,7 @@ from semiglobal_input import (
 )
 
 from mvcodec.kernels import census, matching_costs
+from mvcodec.stereo.matching_view import blindness
 
 
 @size_parameter
@@ -58,9 +59,10 @@ def test_joint_costs_equal_their_plain_twin(
     planes = random_bytes((cameras, size[0], 3, size[1]), 3, spread=60)
     bits = random_bytes((cameras, size[0], 8, size[1]), 4)
     bounds = np.sort(random_bytes((2, cameras, size[0], 2, 3, size[1]), 5, spread=60), axis=3)
+    blind = random_bytes((2, *size), 6, spread=60)
     across = steps[:, 0] != 0
-    expected = twins.joint_costs(planes, bits, bounds, across, steps, low, LIMITS, 6, 100, LEVELS)
-    np.testing.assert_array_equal(joint_costs(planes, bits, bounds, across, steps, low=low), expected)
+    expected = twins.joint_costs(planes, bits, bounds, blind, across, steps, low, LIMITS, 6, 100, LEVELS)
+    np.testing.assert_array_equal(joint_costs(planes, bits, bounds, blind, across, steps, low=low), expected)
 
 
 def test_cost_adds_colour_and_census() -> None:
@@ -90,3 +92,25 @@ def test_only_partner_of_an_array_pays_no_lone_cost_but_the_only_one_in_frame_do
     assert one.T.tolist() == [[6] * 6, [100, *[6] * 5], [100, 100, *[6] * 4]]
     two = uniform_costs([4, 4], [0, 0], [(1, 0), (0, 1)])[0]  # a lower partner of one row: in frame at 0 px
     assert two.T.tolist() == [[6] * 6, [100, *[12] * 5], [100, 100, *[12] * 4]]
+
+
+def test_a_match_in_a_direction_without_detail_does_not_outvote_the_other() -> None:
+    beside_and_below: list[tuple[float, float]] = [(0, 0), (0, 1e-3)]
+    assert (uniform_costs([0, 20], [0, 30], beside_and_below) == 6).all()
+    assert (uniform_costs([0, 20], [0, 30], beside_and_below, blind_rows=40) == 40 + 6).all()
+
+
+def test_a_blind_partner_is_better_than_none() -> None:
+    costs = uniform_costs([0, 0], [0, 0], [(0, 0), (0, 1)], blind_rows=120)[0]  # below: in frame at 0 px
+    assert costs.T.tolist() == [[6] * 6, [100 - 10] * 6, [100 - 10] * 6]
+
+
+def test_a_direction_is_blind_where_edges_run_along_it() -> None:
+    stripes = np.repeat(random_bytes((1, 40), 7), 30, axis=0)
+    along_rows, along_columns = blindness(stripes, (4, 3), 60)
+    assert not along_rows.any()
+    assert (along_columns > 50).all()
+    along_rows, along_columns = blindness(np.ascontiguousarray(stripes.T), (4, 3), 60)
+    assert (along_rows > 50).all()
+    assert not along_columns.any()
+    assert not blindness(np.full((30, 40), 90, np.uint8), (4, 3), 60).any()

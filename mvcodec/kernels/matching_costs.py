@@ -33,6 +33,9 @@ Volume = NDArray[np.uint8]
 OUTSIDE = np.uint8(255)
 """Marks where a partner's picture ends."""
 
+IN_FRAME_LEAD = 10
+"""Where one partner alone holds the pixel, `blind` makes no match dearer than `outside_cost` less this."""
+
 
 @njit(cache=True, nogil=True)
 def sampling_interval(planes: Bytes, along_rows: bool, bounds: Bytes) -> None:
@@ -93,6 +96,7 @@ def joint_costs(
     census: Bytes,
     across: NDArray[np.bool_],
     bounds: Bytes,
+    blind: Bytes,
     width: int,
     steps: NDArray[np.float32],
     low: int,
@@ -117,6 +121,8 @@ def joint_costs(
         across: bool (P,), whether a partner stands beside the camera, else above or below it.
         bounds: uint8 (2, N, H, 2, C, W''), see `sampling_interval`; first those along rows, then those
             along columns.
+        blind: uint8 (2, H, W''), what a pixel's match costs more against partners along rows, and along
+            columns, see `mvcodec.stereo.matching_view.blindness`.
         width: W, of the pictures.
         steps: float32 (P, 2): a pixel of disparity d is at (x - steps[p, 0] * d, y - steps[p, 1] * d)
             of partner p; rounded.
@@ -133,6 +139,7 @@ def joint_costs(
     zero, nowhere = fill(np.uint8(0)), fill(OUTSIDE)
     limit, most_distance = fill(np.uint8(colour_limit)), fill(np.uint8(most_bits))
     each_bit = fill(np.uint8(bit_cost))
+    inside = fill(np.uint8(max(outside_cost - IN_FRAME_LEAD, 0)))
     alone = fill(np.uint8(lone_cost)) if len(steps) > 1 else zero
     outside = np.full(padded, OUTSIDE, np.uint8)
     outside[LANES : LANES + width] = 0
@@ -143,14 +150,14 @@ def joint_costs(
             up[p, level] = int(np.rint(steps[p, 1] * (low + level)))
     sides = np.array([0 if along else 1 for along in across])
     flat_planes, flat_census, flat_bounds = planes.reshape(-1), census.reshape(-1), bounds.reshape(-1)
-    flat = volume.reshape(-1)
+    flat, flat_blind = volume.reshape(-1), blind.reshape(-1)
     for at in range(len(volume)):
         y = start + at
         for x in range(0, columns, LANES):
             plane_here = np.uint64(((camera * height + y) * channels) * padded + LANES + x)
             census_here = np.uint64((camera * height + y) * census.shape[2] * padded + LANES + x)
             for level in range(levels):
-                best, second = nowhere, nowhere
+                best, second, plain = nowhere, nowhere, nowhere
                 for p in range(len(steps)):
                     row, column = y - up[p, level], x - left[p, level]
                     if row < 0 or row >= height or column <= -LANES or column >= width:
@@ -165,10 +172,15 @@ def joint_costs(
                     distance = _distance(flat_census, census_here, flat_census, census_there, words, stride)
                     distance = times(least(distance, most_distance), each_bit)
                     cost = plus(least(halved(difference), limit), distance)
+                    plain = least(plain, most(cost, load(outside, np.uint64(begin))))
+                    blind_here = np.uint64((sides[p] * height + y) * padded + LANES + x)
+                    cost = plus(cost, load(flat_blind, blind_here))
                     cost = most(cost, load(outside, np.uint64(begin)))
                     second = least(second, most(best, cost))
                     best = least(best, cost)
                 lone = plus(best, alone)
-                cost = choose(second, nowhere, lone, least(lone, mean(best, second)))
+                # One partner's picture holds the pixel: that it is blind is no reason to leave it.
+                only = least(lone, most(plus(plain, alone), inside))
+                cost = choose(second, nowhere, only, least(lone, mean(best, second)))
                 cost = choose(best, nowhere, fill(np.uint8(outside_cost)), cost)
                 store(flat, np.uint64((at * levels + level) * columns + x), cost)

@@ -66,7 +66,7 @@ class Joint:
             return dict.fromkeys(array.real, flat)
         if fresh or self._gains.keys() != set(array.real):
             self._gains = self._measured_gains(array, pictures, range_px)
-        views = prepare_views(array, pictures, self._gains, cameras, self._census)
+        views = prepare_views(array, pictures, self._gains, cameras, self._census, self.settings.blind_cost)
         maps, valid = self._refined_maps(array, views, range_px, cameras)
         if self.settings.beyond_partners:
             extended = run_all(
@@ -90,7 +90,7 @@ class Joint:
         def matched(
             array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
         ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
-            views = prepare_views(array, pictures, ones, array.real, self._census)
+            views = prepare_views(array, pictures, ones, array.real, self._census, self.settings.blind_cost)
             return self._matched(array, views, range_px, array.real)
 
         return camera_gains(array, pictures, range_px, matched)
@@ -173,6 +173,7 @@ class Joint:
                 views.census,
                 those.across,
                 views.bounds,
+                views.blind[those.camera],
                 array.width,
                 those.steps,
                 low,

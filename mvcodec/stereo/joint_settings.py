@@ -23,7 +23,13 @@ class JointSettings:
     census_y: int = setting(3, "half the census window's height, px", low=1, high=7)
     bit_cost: int = setting(2, "cost of each bit of census distance", low=0, high=60)
     most_bits: int = setting(21, "bits that count at most", low=0, high=64)
-    lone_cost: int = setting(6, "added where one partner alone must see the pixel", low=0, high=50)
+    lone_cost: int = setting(12, "added where one partner alone must see the pixel", low=0, high=50)
+    blind_cost: int = setting(
+        60,
+        "added to partners in whose direction a picture has no detail, while it has across",
+        low=0,
+        high=100,
+    )
     outside_cost: int = setting(50, "of a disparity that leaves every partner's picture", low=0, high=127)
     small_step: int = setting(17, "penalty P1 of semi-global matching", low=0, high=100)
     jump: int = setting(82, "penalty P2 of semi-global matching", low=0, high=150)
@@ -70,7 +76,8 @@ class JointSettings:
 
     def __post_init__(self) -> None:
         check_settings(self, "JointSettings.")
-        dearest = max(self.colour_limit + self.bit_cost * self.most_bits + self.lone_cost, self.outside_cost)
+        match = self.colour_limit + self.bit_cost * self.most_bits
+        dearest = max(match + self.lone_cost + self.blind_cost, self.outside_cost)
         room = MAX_SUM - max(self.jump, self.least_jump) - self.small_step
         if dearest > room:
             raise SettingError("JointSettings, the highest cost", dearest, f"at most {room}")
@@ -105,6 +112,7 @@ REALTIME: dict[str, Any] = {
     "diagonals": False,
     "completion": False,
     "self_check": True,
+    "blind_cost": 0,
     "beyond_partners": False,
     "subpixel_steps": 0,
 }

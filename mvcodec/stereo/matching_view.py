@@ -14,6 +14,9 @@ from mvcodec.frames import Picture
 from mvcodec.stereo.partners import partners, steps
 from mvcodec.workers import run_all
 
+NOISE_LEVELS = 2.0
+"""Grey levels over two pixels that are no detail."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MatchingViews:
@@ -28,6 +31,7 @@ class MatchingViews:
         census: uint8 (N, H, B, W''), see `mvcodec.kernels.census.census_rows`.
         bounds: uint8 (2, N, H, 2, 3, W''), least and greatest value within half a pixel along rows and along
             columns (`matching_costs.sampling_interval`), of the cameras that are partners so.
+        blind: uint8 (N, 2, H, W''), what matches along rows and along columns cost more (`blindness`).
     """
 
     cameras: Sequence[Position]
@@ -35,6 +39,7 @@ class MatchingViews:
     grey: NDArray[np.uint8]
     census: NDArray[np.uint8]
     bounds: NDArray[np.uint8]
+    blind: NDArray[np.uint8]
 
     def grey_of(self, camera: Position) -> NDArray[np.uint8]:
         """uint8 (H, W)."""
@@ -52,12 +57,34 @@ def equal_grey(picture: Picture, gains: NDArray[np.float32]) -> NDArray[np.uint8
     return np.asarray(cv2.cvtColor(_evened(picture, gains), cv2.COLOR_RGB2GRAY), np.uint8)
 
 
+def blindness(grey: NDArray[np.uint8], radii: tuple[int, int], cost: int) -> NDArray[np.uint8]:
+    """How much dearer a match along rows, and one along columns, is than it seems.
+
+    An edge that runs along the baseline matches at every disparity. Such a match says nothing, and must not
+    outvote the partner across the edge.
+
+    Args:
+        grey: uint8 (H, W).
+        radii: half the size of the window that counts, px along rows and along columns.
+        cost: where there is no detail in the one direction at all, while there is in the other.
+
+    Returns:
+        uint8 (2, H, W): up to `cost`, the weaker slopes are along the one direction than along the other.
+    """
+    window = 2 * radii[0] + 1, 2 * radii[1] + 1
+    slopes = [cv2.Sobel(grey, cv2.CV_32F, along, 1 - along, ksize=1) for along in (1, 0)]
+    detail = [np.sqrt(cv2.blur(slope * slope, window) + NOISE_LEVELS**2) for slope in slopes]
+    both = [1 - own / other for own, other in (detail, detail[::-1])]
+    return np.asarray(np.stack(both).clip(0, 1) * cost + 0.5, np.uint8)
+
+
 def prepare_views(
     array: CameraArray,
     pictures: Mapping[Position, Picture],
     gains: Mapping[Position, NDArray[np.float32]],
     cameras: Sequence[Position],
     census_radii: tuple[int, int],
+    blind_cost: int,
 ) -> MatchingViews:
     """The real cameras' pictures, side by side.
 
@@ -65,6 +92,7 @@ def prepare_views(
         gains: float32 (3,) of each camera, what its R, G and B are multiplied by.
         cameras: the ones to be matched.
         census_radii: of the census's window, px along rows and along columns.
+        blind_cost: see `blindness`.
     """
     from mvcodec.kernels.byte_vectors import LANES
     from mvcodec.kernels.table import kernel
@@ -79,6 +107,7 @@ def prepare_views(
         np.empty((count, height, width), np.uint8),
         np.empty((count, height, words, padded), np.uint8),
         np.empty((2, count, height, 2, 3, padded), np.uint8),
+        np.zeros((count, 2, height, padded), np.uint8),
     )
     beside = {(camera[0] == other[0], other) for camera in cameras for other in partners(array, camera)}
 
@@ -96,6 +125,8 @@ def prepare_views(
             if (along_rows, camera) in beside:
                 kernel("matching_costs.sampling_interval")(planes, along_rows, bounds)
                 found.bounds[side, number][..., inside] = bounds
+        if blind_cost and len(array.real_rows) > 1 and len(array.real_cols) > 1:
+            found.blind[number][..., inside] = blindness(found.grey[number], census_radii, blind_cost)
 
     run_all(prepare, range(count))
     return found
