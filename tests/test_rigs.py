@@ -22,7 +22,7 @@ from mvcodec.rigs.features import Tracks
 from mvcodec.rigs.framing import NothingInCommon, framed
 from mvcodec.rigs.from_scene import rig_from_adjusted
 from mvcodec.rigs.known import rig_from_cameras
-from mvcodec.rigs.remap import Rectifier, project
+from mvcodec.rigs.remap import Rectifier, project, widest_slope
 from mvcodec.rigs.residuals import rays, rectified_tracks, residuals_of
 from mvcodec.rigs.rig import Lens, Rectified, Rig, RigCamera, read_rig, rig_text
 
@@ -310,3 +310,19 @@ def test_a_wrong_calibration_file_is_one_line(tmp_path: Path, text: str, words: 
         read_cameras([path])
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_wide_lens_shows_nothing_twice() -> None:
+    """Brown's polynomial turns back: what it says of rays beyond is none of the picture."""
+    bent = replace(
+        a_camera((0, 0, 0), (0, 0)).lens, focal_px=(180.0, 180.0), coefficients=(-0.2, 0.0, 0.0, 0.0)
+    )
+    turns_back = 1 / np.sqrt(3 * 0.2)
+    assert widest_slope(bent) == pytest.approx(turns_back, abs=0.01)
+    aside = np.array([[0.98 * turns_back, 0.0, 1.0], [1.5 * turns_back, 0.0, 1.0]])
+    near, beyond = project(bent, aside)
+    assert near[0] < SIZE[0]
+    assert np.abs(beyond).max() > 1e4
+    assert widest_slope(replace(bent, coefficients=(-0.28, 0.07, 0.0, 0.0))) > 100
+    fisheye = Lens("fisheye", (150.0, 150.0), (159.5, 99.5), (0.0, -0.1, 0.0, 0.0))
+    assert widest_slope(fisheye) == pytest.approx(np.tan((1 / 0.5) ** 0.25), rel=0.02)

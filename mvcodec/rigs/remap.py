@@ -24,19 +24,45 @@ from them. That much of each pixel's difference from its neighbours is given bac
 _WHOLE_PX = 1 / 64
 """OpenCV interpolates at 32nds of a pixel: maps that are so near to whole ones take nothing."""
 
+_WIDEST_SLOPE, _SLOPES = 4.0, 2000
+
 Vectors = NDArray[np.float64]
 
 
 def project(lens: Lens, rays: Vectors) -> Vectors:
-    """(N, 2): the pixels of directions (N, 3) in the camera's axes, by OpenCV; far away behind the camera."""
+    """(N, 2): the pixels of directions (N, 3) in the camera's axes, by OpenCV.
+
+    Far away for what is behind the camera, or so far aside that the lens's polynomial turns back.
+    """
     zero = np.zeros(3)
     coefficients = np.array(lens.coefficients)
-    there = np.where(rays[:, 2:] > 1e-3, rays, (1e3, 1e3, 1.0))[:, None]
+    aside = np.hypot(rays[:, 0], rays[:, 1]) < widest_slope(lens) * rays[:, 2]
+    there = np.where(((rays[:, 2] > 1e-3) & aside)[:, None], rays, (1e3, 1e3, 1.0))[:, None]
     if lens.model == "fisheye":
         pixels, _ = cv2.fisheye.projectPoints(there, zero, zero, lens.matrix, coefficients)
     else:
         pixels, _ = cv2.projectPoints(there, zero, zero, lens.matrix, coefficients)
     return np.asarray(pixels, np.float64).reshape(-1, 2)
+
+
+def widest_slope(lens: Lens) -> float:
+    """The slope of a ray up to which the lens shows rays that are farther aside farther aside."""
+    slopes = np.linspace(0, _WIDEST_SLOPE, _SLOPES)
+    if lens.model == "fisheye":
+        slopes = np.tan(np.linspace(0, np.arctan(1e3), _SLOPES))
+        angle = np.arctan(slopes)
+        square = angle * angle
+        k1, k2, k3, k4 = lens.coefficients
+        shown = angle * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
+    else:
+        k1, k2, _, _, k3, k4, k5, k6 = (*lens.coefficients, *[0.0] * 4)[:8]
+        square = slopes * slopes
+        over, under = (
+            1 + square * (a + square * (b + square * c)) for a, b, c in ((k1, k2, k3), (k4, k5, k6))
+        )
+        shown = slopes * over / under
+    falls = np.nonzero(np.diff(shown) <= 0)[0]
+    return float(slopes[falls[0]]) if len(falls) else 1e3
 
 
 def source_places(camera: RigCamera, at: Position, view: Rectified, pixels: Vectors) -> Vectors:
