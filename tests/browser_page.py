@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import base64
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from player_files import SYNTHESIZER, Running, decode_picture
-from playwright.sync_api import FloatRect, Page
+from playwright.sync_api import Browser, FloatRect, Page
 
 from mvcodec.array import Viewpoint
 from mvcodec.decoding.decoder import Decoder
@@ -26,11 +27,27 @@ ARGUMENTS = (
     "--disable-component-update",
     "--disable-sync",
 )
+HERE = ("http://127.0.0.1:", "ws://127.0.0.1:", "blob:", "data:", "file:///", "about:")
 SCREENSHOTS = Path(__file__).parents[1] / "build" / "screenshots"
 FIRST_PICTURE_MS = 240_000
 """Kernels may have to be compiled first, on a machine that does much else."""
 SAME_DB = 33
 """A picture that came as JPEG has more than this against its own source."""
+
+
+def watched_page(browser: Browser, width: int, height: int) -> Iterator[Page]:
+    """A page whose errors fail the test, and whose requests must stay on this machine. Nothing sways."""
+    page = browser.new_page(viewport={"width": width, "height": height}, reduced_motion="reduce")
+    troubles: list[str] = []
+    page.on("pageerror", lambda error: troubles.append(str(error)))
+    page.on("request", lambda request: None if is_here(request.url) else troubles.append(request.url))
+    yield page
+    page.close()
+    assert troubles == []
+
+
+def is_here(url: str) -> bool:
+    return url.startswith(HERE)
 
 
 def show(page: Page, server: Running, link: str = "") -> None:

@@ -26,7 +26,7 @@ from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import SettingError, StreamError
 from mvcodec.stream import Packet, StreamHeader
 
-TINY_COUNT, TINY_GOP = 12, 3
+TINY_COUNT, TINY_GOP = 6, 2
 
 
 @pytest.fixture(scope="module")

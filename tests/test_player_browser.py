@@ -120,9 +120,9 @@ def test_what_lies_between_two_marks_is_played_over_and_over(page: Page, server:
 
 
 def test_it_sways_until_somebody_touches_it_and_has_the_colours_of_the_system(
-    browser: Browser, server: Running
+    chromium: Browser, server: Running
 ) -> None:
-    page = browser.new_page(viewport={"width": 1280, "height": 720}, color_scheme="light")
+    page = chromium.new_page(viewport={"width": 1280, "height": 720}, color_scheme="light")
     show(page, server)
     page.wait_for_function("() => Number(document.body.dataset.col) > 1.05")
     dark = page.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -227,14 +227,14 @@ def test_measures_against_the_original(page: Page, server: Running) -> None:
     page.wait_for_selector("#quality:has-text('no original')")
 
 
-def test_a_link_shows_the_same_picture(page: Page, browser: Browser, server: Running) -> None:
+def test_a_link_shows_the_same_picture(page: Page, chromium: Browser, server: Running) -> None:
     show(page, server, "#frame=7&view=0.5,1.25&look=anaglyph&eyes=0.3")
     assert on_screen(page) == (7, 0.5, 1.25)
     page.keyboard.press(".")
     page.keyboard.press("ArrowRight")
     shows(page, frame=8, col=1.5)
     page.wait_for_url("**#frame=8&view=0.5,1.5&look=anaglyph&eyes=0.3")
-    other = browser.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="reduce")
+    other = chromium.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="reduce")
     other.goto(page.url)
     shows(other, frame=8, row=0.5, col=1.5, look="anaglyph")
     np.testing.assert_array_equal(pixels(other), pixels(page))

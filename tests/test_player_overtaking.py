@@ -8,6 +8,7 @@ import struct
 import threading
 import time
 from collections.abc import Iterator, MutableMapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -97,4 +98,5 @@ async def watch(maker: SlowMaker) -> None:
 
 
 def test_a_draft_overtakes_the_whole_picture_before_it(maker: SlowMaker) -> None:
-    asyncio.run(watch(maker))
+    with ThreadPoolExecutor(1) as pool:  # the thread of a browser's tests has a loop of its own
+        pool.submit(asyncio.run, watch(maker)).result()

@@ -79,10 +79,10 @@ def test_the_server_goes_and_comes_back(page: Page, file: Path) -> None:
 
 
 def test_two_viewers_watch_their_own_pictures(
-    page: Page, browser: Browser, server: Running, file: Path
+    page: Page, chromium: Browser, server: Running, file: Path
 ) -> None:
     show(page, server, "#frame=2&view=0,0")
-    other = browser.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="reduce")
+    other = chromium.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="reduce")
     show(other, server, "#frame=9&view=2,1.5")
     other.keyboard.press(",")
     shows(other, frame=8)

@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser_page import ARGUMENTS, CHROMIUM
+from browser_page import watched_page
 from player_files import Running, playing
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from mvcodec.frames import Picture
 from mvcodec.web_player.pages import page_files
+
+pytest_plugins = ("chromium",)
 
 SAMPLE = Path(__file__).parent / "conformance" / "square.mcap"
 """3 x 3 views of 64 x 48, six frames, ten a second."""
@@ -96,24 +98,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     yield from serve_folder(folder)
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=list(ARGUMENTS))
-        yield found
-        found.close()
-
-
 @pytest.fixture
 def tab(chromium: Browser) -> Iterator[Page]:
-    """A page whose errors fail the test, and whose requests must stay on this machine. Nothing sways."""
-    page = chromium.new_page(viewport={"width": 960, "height": 600}, reduced_motion="reduce")
-    troubles: list[str] = []
-    page.on("pageerror", lambda error: troubles.append(str(error)))
-    page.on("request", lambda request: troubles.append(request.url) if _is_foreign(request.url) else None)
-    yield page
-    page.close()
-    assert troubles == []
+    yield from watched_page(chromium, 960, 600)
 
 
 @pytest.fixture(scope="module")
@@ -129,12 +116,6 @@ def sample_page(tab: Page, sample_server: Running) -> Page:
     tab.goto(f"{sample_server.url}?view=1,1&t=0.2")
     tab.evaluate("document.querySelector('mvcodec-player').ready")
     return tab
-
-
-def _is_foreign(url: str) -> bool:
-    return not url.startswith(
-        ("http://127.0.0.1:", "ws://127.0.0.1:", "blob:", "data:", "file:///", "about:")
-    )
 
 
 def pixels_of(page: Page, selector: str = "mvcodec-player", fine: bool = True) -> Picture:
