@@ -131,7 +131,7 @@ def test_settings_are_checked_before_anything_is_written(tmp_path: Path) -> None
     path = tmp_path / "x.mcap"
     for changes, message in (
         ({"qpp": 3}, "qpp: found no such setting, expected one of qp, crf, bitrate_kbps, rate, codec"),
-        ({"qp": 99}, r"qp: found 99, expected an integer, 1\.\.51"),
+        ({"qp": 99}, r"qp: found 99, expected a whole number, 1\.\.51"),
         ({"fps": 0}, "array.fps: found 0, expected"),
         ({"real": "0x1"}, "found 0x1"),
         ({"gop": 31}, r"gop: found 31, expected 1\.\.30"),

@@ -145,7 +145,7 @@ def test_a_map_that_is_not_finite_is_named() -> None:
         ({"qp": 0}, r"qp: found 0, expected 1\.\.51"),
         ({"disparity_scale": 3}, "disparity_scale: found 3, expected 1 or 2"),
         ({"disparity_median": 4}, "disparity_median: found 4, expected 0"),
-        ({"disparity_qp": 60}, r"disparity_qp: found 60, expected an integer, 1\.\.51"),
+        ({"disparity_qp": 60}, r"disparity_qp: found 60, expected a whole number, 1\.\.51"),
         ({"gop": 0}, r"gop: found 0, expected a whole number of at least 1"),
         ({"crf": 20.0}, r"found qp and crf, expected exactly one"),
         ({"disparity_range_px": (3.0, 3.0)}, r"disparity_range_px: found \[3\.0, 3\.0\], expected lo < hi"),

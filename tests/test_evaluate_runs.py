@@ -101,7 +101,7 @@ def test_pictures_that_occur_twice_are_told(tmp_path: Path) -> None:
     ("options", "message"),
     [
         (("--disparity-scale", "3"), "--disparity-scale: found 3"),
-        (("--qp", "60"), "--qp: found 60, expected an integer, 1..51"),
+        (("--qp", "60"), "--qp: found 60, expected a whole number, 1..51"),
         (("--qp", "a"), "expected whole numbers such as 22,27,32,37"),
         (("--anchors", "best"), "--anchors: found best, expected some of simulcast, pvs"),
         (("--anchor-codecs", "vp8"), "--anchor-codecs: found vp8, expected one of h264, hevc, av1"),

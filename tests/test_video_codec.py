@@ -160,7 +160,7 @@ def test_maps_keep_their_codes_within_the_quantiser(codec: Codec) -> None:
     ("rate", "message"),
     [
         ({"qp": 0}, r"qp: found 0, expected 1\.\.63 \(0 is lossless"),
-        ({"qp": 64}, r"qp: found 64, expected an integer, 1\.\.63"),
+        ({"qp": 64}, r"qp: found 64, expected a whole number, 1\.\.63"),
         ({"crf": 0.0}, r"crf: found 0\.0, expected 1\.\.63"),
         ({"bitrate_kbps": -5.0}, r"bitrate_kbps: found -5\.0"),
         ({}, r"found none of them, expected exactly one"),
@@ -175,7 +175,7 @@ def test_bad_rates_are_refused(rate: dict[str, float], message: str) -> None:
 def test_each_codec_keeps_to_its_own_scale(codec: Codec) -> None:
     top = codec.max_qp
     codec.encoder(_settings(qp=top))
-    with pytest.raises(SettingError, match=rf"expected an integer, 1\.\.{top}"):
+    with pytest.raises(SettingError, match=rf"expected a whole number, 1\.\.{top}"):
         codec.encoder(_settings(qp=top + 1))
     with pytest.raises(SettingError, match=rf"expected 1\.\.{top}"):
         codec.encoder(_settings(crf=top + 0.5))

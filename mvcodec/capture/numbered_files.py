@@ -23,6 +23,11 @@ _SPARSE = 3
 
 Numbers = tuple[int, ...]
 
+NUMBERED = (
+    "names that differ in their numbers only; files of other names are read as they are named, in row order,"
+    " with `grid` RxC and no array.json"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class FoundViews:
@@ -125,7 +130,7 @@ def _keys(folder: Path, names: Sequence[str]) -> dict[Numbers, str]:
     shapes = {_NUMBER.sub("#", name): name for name in names}
     if len(shapes) > 1:
         one, other = list(shapes.values())[:2]
-        raise InputError(folder, f"{one} and {other}", "names that differ in their numbers only")
+        raise InputError(folder, f"{one} and {other}", NUMBERED)
     numbers = {name: tuple(map(int, _NUMBER.findall(name))) for name in names}
     named = _ROW_AND_COLUMN.search(names[0])
     kept = [] if named is None else [len(_NUMBER.findall(names[0][: named.start()])) + i for i in (0, 1)]

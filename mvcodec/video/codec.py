@@ -111,7 +111,7 @@ def check_qp(setting: str, qp: int | None, max_qp: int) -> None:
         expected = f"1..{max_qp} (0 is lossless coding, a profile that players don't decode)"
         raise SettingError(setting, 0, expected)
     if qp is not None and not (isinstance(qp, int) and 1 <= qp <= max_qp):
-        raise SettingError(setting, qp, f"an integer, 1..{max_qp}")
+        raise SettingError(setting, qp, f"a whole number, 1..{max_qp}")
 
 
 def check_preset(preset: str) -> None:
