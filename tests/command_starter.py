@@ -1,13 +1,15 @@
 """Starts commands quickly: a process that has imported what they need forks one for each of them.
 
-Importing is most of a short command's time. Run as a program, it takes from a socket (the descriptor in its
-one argument) what to run, with which standard streams, and gives back how it ended.
+Importing, and loading compiled code that is kept, is most of a short command's time. Run as a program, it
+takes from a socket (the descriptor in its one argument) what to run, with which standard streams, and gives
+back how it ended.
 """
 
 from __future__ import annotations
 
 import atexit
 import gc
+import io
 import json
 import os
 import runpy
@@ -24,7 +26,13 @@ COMMANDS = ("batch", "compare", "decode", "encode", "evaluate", "info", "rectify
 """Whose modules are imported ahead; the others need little more than these."""
 OF_ONE_TEST = "PYTEST_CURRENT_TEST"
 """Differs from test to test in the environment, and means nothing to a command."""
+AGAIN_AFTER = (1, 2, 4, 8, 16, 32)
+"""Commands after which it is tried again to warm up, where kernels were not compiled yet."""
 _MOST_BYTES = 1 << 16
+
+
+class _NotCompiled(Exception):
+    """A kernel would have to be compiled."""
 
 
 class Starter:
@@ -84,6 +92,58 @@ def _read(descriptor: int) -> bytes:
         return pipe.read()
 
 
+def _warm_up() -> bool:
+    """Code, decode and look at a small picture, so that each command has what that loads, kernels above all.
+
+    Commands fork from here, so nothing of it may leave a thread behind. Where kernels are not compiled yet,
+    that is left to the commands; returns whether they were.
+    """
+    import cv2
+    import numpy as np
+
+    from mvcodec.array import Calibration, CameraArray, Viewpoint
+    from mvcodec.container import McapWriter
+    from mvcodec.decoding.decoder import Decoder
+    from mvcodec.encoding.encoder import Encoder, EncoderConfig
+    from mvcodec.frames import FrameSet
+    from mvcodec.kernels import on_first_compilation
+    from mvcodec.stereo.disparity_range import estimate_range
+    from mvcodec.synthesis.synthesizers import SYNTHESIZERS, make_synthesizer
+    from mvcodec.workers import threads
+
+    warming = True
+
+    def compiling() -> None:
+        if warming:
+            raise _NotCompiled
+
+    on_first_compilation(compiling)
+    array = CameraArray(2, 2, 64, 48, 10.0, (0, 1), (0, 1), Calibration.nominal(64, 48))
+    noise = np.random.default_rng(0).integers(0, 256, (48, 64, 3), np.uint8)
+    frame_set = FrameSet(0, 0, dict.fromkeys(array.real, noise))
+    file = io.BytesIO()
+    usual = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        with threads(1):
+            estimate_range(array, [frame_set], None)
+            with McapWriter(file) as writer, Encoder(array, EncoderConfig()) as encoder:
+                writer.push(encoder.push(frame_set))
+            file.seek(0)
+            with Decoder.open(file) as decoder:
+                (decoded,) = decoder
+            for name in SYNTHESIZERS:
+                make_synthesizer(name).render(decoded, Viewpoint(0.5, 0.5))
+    except _NotCompiled:
+        return False
+    finally:
+        warming = False
+        cv2.setNumThreads(usual)
+        gc.collect()
+        gc.freeze()  # or each command would look through all of it at its end
+    return True
+
+
 def serve(channel: socket.socket) -> None:
     """Fork for each command that is asked for; returns at the end of the channel, and in each child."""
     from mvcodec.cli.main import tell_libraries
@@ -91,14 +151,15 @@ def serve(channel: socket.socket) -> None:
     tell_libraries()
     for command in COMMANDS:
         import_module(f"mvcodec.cli.{command}")
-    import_module("numba")
-    gc.collect()
-    gc.freeze()  # or each command would look through all of it at its end
+    forked, warm = 0, _warm_up()
     usual = signal.signal(signal.SIGINT, signal.SIG_IGN)
     while True:
         message, streams, _, _ = socket.recv_fds(channel, _MOST_BYTES, 3)
         if not message:
             return
+        if not warm and forked in AGAIN_AFTER:
+            warm = _warm_up()
+        forked += 1
         child = os.fork()
         if child == 0:
             signal.signal(signal.SIGINT, usual)
