@@ -244,7 +244,7 @@ def _obu_types(data: bytes) -> list[int]:
 def test_unknown_names_are_refused_with_the_choices() -> None:
     with pytest.raises(SettingError, match=r"preset: found turbo, expected ultrafast, .*placebo"):
         _settings(preset="turbo")
-    with pytest.raises(SettingError, match=r"codec: found vp8, expected h264"):
+    with pytest.raises(SettingError, match=r"codec: found vp8, expected one of h264"):
         find_codec("vp8")
 
 
