@@ -31,12 +31,14 @@ NEEDS_VENV = $(if $(shell $(PYTHON) -c 'import sys, venv, ensurepip; print(sys.v
 NODE_ENV := PATH="$(CURDIR)/$(BIN):$$PATH"
 WEB_STAMP := web/node_modules/.installed
 
-.PHONY: demo test test-slow docs benchmark fuzz lint web
+.PHONY: demo test test-slow docs benchmark fuzz lint kernels web
 
 demo: $(STAMP)
 	$(BIN)/python tools/demo.py $(if $(INPUT),--input "$(INPUT)") --out "$(OUT)"
 
-test: lint
+# One core checks while the other compiles the kernels, where they have changed.
+test: $(STAMP) $(WEB_STAMP)
+	@$(MAKE) --no-print-directory --jobs 2 lint kernels
 	cd web && $(NODE_ENV) node build.mjs --tests && $(NODE_ENV) node --test ../build/web-tests/*.test.mjs
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
@@ -58,6 +60,9 @@ lint: $(STAMP) $(WEB_STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	cd web && $(NODE_ENV) npm run check --silent
+
+kernels: $(STAMP)
+	$(BIN)/python tests/warm_up.py
 
 web: $(WEB_STAMP)
 	cd web && $(NODE_ENV) npm run build --silent

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import atexit
 import gc
-import io
 import json
 import os
 import runpy
@@ -23,16 +22,11 @@ from importlib import import_module
 from pathlib import Path
 
 COMMANDS = ("batch", "compare", "decode", "encode", "evaluate", "info", "rectify", "render", "validate")
-"""Whose modules are imported ahead; the others need little more than these."""
+MODULES = (*(f"cli.{command}" for command in COMMANDS), "evaluation.report", "evaluation.study")
+"""Imported ahead; commands need little more than these."""
 OF_ONE_TEST = "PYTEST_CURRENT_TEST"
 """Differs from test to test in the environment, and means nothing to a command."""
-AGAIN_AFTER = (1, 2, 4, 8, 16, 32)
-"""Commands after which it is tried again to warm up, where kernels were not compiled yet."""
 _MOST_BYTES = 1 << 16
-
-
-class _NotCompiled(Exception):
-    """A kernel would have to be compiled."""
 
 
 class Starter:
@@ -92,74 +86,23 @@ def _read(descriptor: int) -> bytes:
         return pipe.read()
 
 
-def _warm_up() -> bool:
-    """Code, decode and look at a small picture, so that each command has what that loads, kernels above all.
-
-    Commands fork from here, so nothing of it may leave a thread behind. Where kernels are not compiled yet,
-    that is left to the commands; returns whether they were.
-    """
-    import cv2
-    import numpy as np
-
-    from mvcodec.array import Calibration, CameraArray, Viewpoint
-    from mvcodec.container import McapWriter
-    from mvcodec.decoding.decoder import Decoder
-    from mvcodec.encoding.encoder import Encoder, EncoderConfig
-    from mvcodec.frames import FrameSet
-    from mvcodec.kernels import on_first_compilation
-    from mvcodec.stereo.disparity_range import estimate_range
-    from mvcodec.synthesis.synthesizers import SYNTHESIZERS, make_synthesizer
-    from mvcodec.workers import threads
-
-    warming = True
-
-    def compiling() -> None:
-        if warming:
-            raise _NotCompiled
-
-    on_first_compilation(compiling)
-    array = CameraArray(2, 2, 64, 48, 10.0, (0, 1), (0, 1), Calibration.nominal(64, 48))
-    noise = np.random.default_rng(0).integers(0, 256, (48, 64, 3), np.uint8)
-    frame_set = FrameSet(0, 0, dict.fromkeys(array.real, noise))
-    file = io.BytesIO()
-    usual = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        with threads(1):
-            estimate_range(array, [frame_set], None)
-            with McapWriter(file) as writer, Encoder(array, EncoderConfig()) as encoder:
-                writer.push(encoder.push(frame_set))
-            file.seek(0)
-            with Decoder.open(file) as decoder:
-                (decoded,) = decoder
-            for name in SYNTHESIZERS:
-                make_synthesizer(name).render(decoded, Viewpoint(0.5, 0.5))
-    except _NotCompiled:
-        return False
-    finally:
-        warming = False
-        cv2.setNumThreads(usual)
-        gc.collect()
-        gc.freeze()  # or each command would look through all of it at its end
-    return True
-
-
 def serve(channel: socket.socket) -> None:
     """Fork for each command that is asked for; returns at the end of the channel, and in each child."""
     from mvcodec.cli.main import tell_libraries
 
     tell_libraries()
-    for command in COMMANDS:
-        import_module(f"mvcodec.cli.{command}")
-    forked, warm = 0, _warm_up()
+    from warm_up import warm_up
+
+    for module in MODULES:
+        import_module(f"mvcodec.{module}")
+    warm_up()
+    gc.collect()
+    gc.freeze()  # or each command would look through all of it at its end
     usual = signal.signal(signal.SIGINT, signal.SIG_IGN)
     while True:
         message, streams, _, _ = socket.recv_fds(channel, _MOST_BYTES, 3)
         if not message:
             return
-        if not warm and forked in AGAIN_AFTER:
-            warm = _warm_up()
-        forked += 1
         child = os.fork()
         if child == 0:
             signal.signal(signal.SIGINT, usual)
@@ -175,10 +118,36 @@ def serve(channel: socket.socket) -> None:
         channel.send(b"%d" % os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 
 
+class Ending:
+    """How a forked command ends: as usual, but its objects are not taken apart one by one.
+
+    They lie in memory that it shares with the process it was forked from, each page of which would be copied.
+    """
+
+    def __init__(self) -> None:
+        self.code = 1  # of an exception that nobody caught
+        self._parent = os.getpid()
+        atexit.register(self._leave)  # before what is imported later registers its own: those run first
+
+    @property
+    def is_fork(self) -> bool:
+        return os.getpid() != self._parent
+
+    def _leave(self) -> None:
+        if self.is_fork:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(self.code)
+
+
 if __name__ == "__main__":
-    parent = os.getpid()
+    ending = Ending()
     with socket.socket(fileno=int(sys.argv[1])) as given:
         given.set_inheritable(False)
         serve(given)
-    if os.getpid() != parent:
-        runpy.run_module("mvcodec", run_name="__main__", alter_sys=True)
+    if ending.is_fork:
+        try:
+            runpy.run_module("mvcodec", run_name="__main__", alter_sys=True)
+        except SystemExit as left:
+            ending.code = left.code if isinstance(left.code, int) else int(left.code is not None)
+            raise
