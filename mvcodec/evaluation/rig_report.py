@@ -21,6 +21,8 @@ from mvcodec.rigs.residuals import Residuals, rectified_tracks
 _LINES = 9
 _WIDTH = 1200
 _GOOD_PX = 0.5
+_CENTRES_APART = 0.01
+"""In widths of the picture: by how much the principal points of two cameras of one kind may differ."""
 _COLOURS = ((213, 94, 0), (0, 114, 178), (0, 158, 115), (204, 121, 167), (230, 159, 0))
 
 
@@ -80,8 +82,14 @@ def advice(found: Calibrated) -> list[str]:
                 " texture near and far, or a board."
             )
     if found.rig.found_by == "scene":
+        view = found.rig.rectified
+        shift_px = _CENTRES_APART * found.rig.source_size[0]
+        share = shift_px / max(view.typical_w * view.focal_px, 1e-6)
         said.append(
-            "Found from the scene alone: how large things are is not known, and baselines are not metric."
+            "Found from the scene alone: how large things are is not known, and baselines are not metric. Nor"
+            f" are distances, though views are right: lenses that sit aside by {_CENTRES_APART:.0%} of the"
+            " picture's width look like turned cameras, and shift all disparities by"
+            f" {shift_px:.0f} px, {share:.0%} of what is usual here. A board or calibration files tell."
         )
     return said
 
