@@ -21,7 +21,7 @@ from mvcodec.conformance.recovery import recover
 from mvcodec.conformance.validation import validate
 from mvcodec.container import read_info
 from mvcodec.decoding.decoder import Decoder
-from mvcodec.decoding.estimated_maps import MapsOnDemand, can_be_estimated, estimate_maps
+from mvcodec.decoding.estimated_maps import MapsOnDemand, Smoothed, can_be_estimated, estimate_maps
 from mvcodec.decoding.frame_store import FrameStore
 from mvcodec.encoding.encoder import EncoderConfig
 from mvcodec.errors import MvCodecWarning, SettingError, StreamError
@@ -170,6 +170,26 @@ def test_a_camera_without_neighbours_takes_what_the_others_say() -> None:
     assert (maps[0, 3].values_px == 5).all()
     assert not can_be_estimated(array, [(0, 0), (0, 2)])
     assert can_be_estimated(make_array(rows=1, cols=1), [(0, 0)])
+
+
+def test_noise_of_the_maps_is_smoothed_and_their_edges_stay() -> None:
+    array = make_array()
+    pictures = {camera: np.zeros((64, 96, 3), np.uint8) for camera in array.real}
+    truth = np.where(np.arange(96) < 40, 9, 4).astype(np.float32) * np.ones((64, 1), np.float32)
+    noise = np.random.default_rng(1).normal(0, 0.3, truth.shape).astype(np.float32)
+
+    class Noisy:
+        def match(
+            self, array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
+        ) -> dict[Position, DisparityMap]:
+            assert (array.height, array.width) == truth.shape
+            assert range_px == RANGE_PX
+            return dict.fromkeys(pictures, DisparityMap(truth + noise, np.ones(truth.shape, np.bool_)))
+
+    for found in Smoothed(Noisy()).match(array, pictures, RANGE_PX).values():
+        left = found.values_px - truth
+        assert left.std() < 0.5 * noise.std()
+        assert np.abs(left).max() < np.abs(noise).max()
 
 
 def test_the_others_go_on_without_a_camera() -> None:

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from mvcodec.array import CameraArray, Position
@@ -15,8 +16,13 @@ from mvcodec.frames import DisparityMap, Picture
 from mvcodec.layers.refinement import make_matcher
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stream import StreamHeader
+from mvcodec.workers import run_all
 
 DEFAULT_MATCHER = "joint"
+
+SMOOTH_WINDOW, SMOOTH_PX, SMOOTH_REACH_PX = 7, 1.0, 2.0
+"""Of `Smoothed`: the window, px, and how much nearness of disparities and of pixels count; measured in
+docs/measurements.md."""
 
 
 class MapsOnDemand(Mapping[Position, DisparityMap]):
@@ -53,20 +59,44 @@ class MapsOnDemand(Mapping[Position, DisparityMap]):
         return len(self._cameras)
 
 
+class Smoothed:
+    """A matcher whose maps are smoothed within surfaces: coding noise in pictures makes noise in maps.
+
+    Args:
+        matcher: what matches.
+    """
+
+    def __init__(self, matcher: Matcher) -> None:
+        self._matcher = matcher
+
+    def match(
+        self, array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
+    ) -> dict[Position, DisparityMap]:
+        """See `Matcher.match`."""
+        maps = self._matcher.match(array, pictures, range_px)
+        return dict(zip(maps, run_all(_smoothed, maps.values()), strict=True))
+
+
+def _smoothed(found: DisparityMap) -> DisparityMap:
+    values = cv2.bilateralFilter(found.values_px, SMOOTH_WINDOW, SMOOTH_PX, SMOOTH_REACH_PX)
+    return DisparityMap(np.asarray(values, np.float32), found.valid)
+
+
 def decoding_matcher(header: StreamHeader, asked: str | Matcher | None) -> Matcher:
     """What estimates the maps of a stream: the matcher asked for, else the one that its settings name.
 
-    Settings that name none, or one that is not known here, leave it to DEFAULT_MATCHER.
+    Settings that name none, or one that is not known here, leave it to DEFAULT_MATCHER. Maps of matchers by
+    name are `Smoothed`; those of one's own stay as they are.
 
     Raises:
         SettingError: the matcher asked for is not known.
     """
     if asked is not None:
-        return make_matcher(asked) if isinstance(asked, str) else asked
+        return Smoothed(make_matcher(asked)) if isinstance(asked, str) else asked
     try:
-        return make_matcher(str(header.settings.get("matcher", DEFAULT_MATCHER)))
+        return Smoothed(make_matcher(str(header.settings.get("matcher", DEFAULT_MATCHER))))
     except SettingError:
-        return make_matcher(DEFAULT_MATCHER)
+        return Smoothed(make_matcher(DEFAULT_MATCHER))
 
 
 def can_be_estimated(array: CameraArray, there: Collection[Position]) -> bool:
