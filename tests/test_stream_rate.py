@@ -8,19 +8,23 @@ import pytest
 from coding import RANGE_PX, RampMatcher
 from test_enhancement import ARRAY, encode, frames, pushed
 
-from mvcodec.encoding.config import LAYER_OFFSET, EncoderConfig
+from mvcodec.encoding.config import LAYER_SLOPE, MOST_LAYER_OFFSET, EncoderConfig
 from mvcodec.encoding.encoder import Encoder
 from mvcodec.encoding.stream_rate import StreamRate
 from mvcodec.errors import SettingError
 from mvcodec.stream import TrackKind
 
 
-def test_auto_follows_the_quality_of_the_pictures() -> None:
-    assert EncoderConfig(qp=27, enhance="auto").layer_quality == 27 + LAYER_OFFSET
-    assert EncoderConfig(qp=50, enhance="auto").layer_quality == 51
-    assert EncoderConfig(qp=27, enhance=30).layer_quality == 30
-    assert EncoderConfig(bitrate_kbps=100, enhance="auto").layer_quality is None
-    assert EncoderConfig(qp=27).layer_quality is None
+def test_auto_follows_the_quality_of_the_pictures_and_how_many_views_build_on_each() -> None:
+    auto = EncoderConfig(qp=27, enhance="auto")
+    assert auto.layer_quality(8, 4) == 27 + LAYER_SLOPE
+    assert auto.layer_quality(16, 4) == 27 + 2 * LAYER_SLOPE
+    assert auto.layer_quality(285, 4) == 27 + MOST_LAYER_OFFSET
+    assert auto.layer_quality(1, 4) == 27
+    assert EncoderConfig(qp=50, enhance="auto").layer_quality(21, 4) == 51
+    assert EncoderConfig(qp=27, enhance=30).layer_quality(21, 4) == 30
+    assert EncoderConfig(bitrate_kbps=100, enhance="auto").layer_quality(21, 4) is None
+    assert EncoderConfig(qp=27).layer_quality(21, 4) is None
     with pytest.raises(SettingError, match="enhance: found best, expected a QP, or auto"):
         EncoderConfig(enhance="best")
 

@@ -59,9 +59,10 @@ class Coders:
             self._predicted = PredictedCameras(header, self._codec, quantizer, config.chosen_preset)
         self._enhancer: Enhancer | None = None
         if layer_views:
-            assert config.layer_quality is not None
+            quality = config.layer_quality(len(layer_views), len(array.real))
+            assert quality is not None
             assert config.enhance is not None
-            quantizer = predicted_quantizer(config.layer_quality, self._codec)
+            quantizer = predicted_quantizer(quality, self._codec)
             self._enhancer = Enhancer(
                 header, layer_views, quantizer, config.chosen_preset, config.enhance, config.enhance_chain
             )

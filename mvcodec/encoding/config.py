@@ -34,8 +34,9 @@ PREDICTING_CAMERAS = "alternate"
 PREDICTING_EXTRA = 0
 """QPs, on libx264's scale, that such maps are coarser by."""
 
-LAYER_OFFSET = 6
-"""What the layer's QP is more than the pictures', on libx264's scale: fitted in `docs/prediction.md`."""
+LAYER_SLOPE, MOST_LAYER_OFFSET = 2.5, 6.0
+"""What the layer's QP is more than the pictures', on libx264's scale: LAYER_SLOPE for each doubling of the
+views that build on a real camera, within what was measured; fitted in `docs/prediction.md`."""
 
 DEFAULT_RATE = RateControl(qp=27)
 
@@ -176,13 +177,17 @@ class EncoderConfig:
         """The pictures' QP or CRF; None where a bit rate governs."""
         return self.rate.quality
 
-    @property
-    def layer_quality(self) -> float | None:
-        """The enhancement layer's QP on the codec's scale; None where none is, or a bit rate governs it."""
+    def layer_quality(self, views: int, cameras: int) -> float | None:
+        """The enhancement layer's QP on the codec's scale; None where none is, or a bit rate governs it.
+
+        Args:
+            views: of the layer; cameras: real ones.
+        """
         if self.enhance != AUTO or self.quality is None:
             return None if isinstance(self.enhance, str) else self.enhance
         codec = find_codec(self.codec)
-        return min(self.quality + LAYER_OFFSET * codec.qp_line[0], codec.max_qp)
+        offset = min(max(LAYER_SLOPE * math.log2(views / cameras), 0.0), MOST_LAYER_OFFSET)
+        return min(self.quality + offset * codec.qp_line[0], codec.max_qp)
 
     @property
     def shared_kbps(self) -> float | None:
