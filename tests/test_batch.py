@@ -173,7 +173,8 @@ def test_object_stores_hold_inputs_and_outputs(
         succeeds("batch", "encode", "s3://inputs/room", *options)
         assert store.cat_file("outputs/coded/room.mcap") == whole
         assert sorted(store.find("outputs")) == ["outputs/coded/batch/room.json", "outputs/coded/room.mcap"]
-        again = json.loads(succeeds("batch", "encode", "s3://inputs/room", *options, "--json"))
+        one_worker = ("local:1" if option == "local:2" else option for option in options)
+        again = json.loads(succeeds("batch", "encode", "s3://inputs/room", *one_worker, "--json"))
         assert [job["state"] for job in again] == ["there before"]
     finally:
         server.stop()

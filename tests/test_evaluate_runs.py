@@ -34,7 +34,7 @@ def heeding_ctrl_c() -> Iterator[None]:
 @pytest.mark.usefixtures("heeding_ctrl_c")
 def test_an_interrupted_run_goes_on_where_it_stopped(array: Path, tmp_path: Path) -> None:
     # Enough points that a busy machine cannot be through with them before the signal comes.
-    qps = [str(qp) for qp in range(12, 48, 2)]
+    qps = [str(qp) for qp in range(12, 48, 4)]
     arguments = [str(array), "--output", str(tmp_path / "r"), "--qp", ",".join(qps), *FAST]
     arguments += ["--anchors", "simulcast", "--anchor-codecs", "h264"]
     with subprocess.Popen(

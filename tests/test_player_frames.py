@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from player_files import FRAMES, GOP, damage, encode, write_original
+from player_files import FRAMES, GOP, damage, encode
 
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.decoding.frame_store import MIN_CACHED, FrameStore
@@ -15,11 +15,7 @@ from mvcodec.decoding.frame_table import read_frame_table
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet
 
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("frames")
-    return encode(write_original(folder / "original", (2, 2)), folder / "room.mcap")
+pytest_plugins = ("player_fixtures",)
 
 
 @pytest.fixture(scope="module")

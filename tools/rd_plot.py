@@ -21,8 +21,8 @@ from mvcodec.errors import InputError, MissingExtra, MvCodecError, OutputError, 
 SUFFIXES = (".svg", ".png", ".pdf")
 
 
-def main() -> int:
-    """Parse, read, draw."""
+def main(words: Sequence[str] | None = None) -> int:
+    """Parse (the command line's words by default), read, draw."""
     parser = argparse.ArgumentParser(description="A rate-distortion figure of mvcodec's reports.")
     parser.add_argument("reports", type=Path, nargs="+", metavar="REPORT.json")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE")
@@ -34,7 +34,7 @@ def main() -> int:
         metavar="NAME,..",
         help="the anchors to draw, as the reports name them (default: all)",
     )
-    arguments = parser.parse_args()
+    arguments = parser.parse_args(words)
     try:
         draw(arguments.reports, arguments.output, arguments.metric, arguments.anchors)
     except MvCodecError as error:
