@@ -14,12 +14,16 @@ from pathlib import Path
 
 import pytest
 import rd_plot
+from browser_page import CHROMIUM, NO_CHROMIUM
 from command_line import mvcodec, succeeds
 from evaluate_reports import FAST, point_times, report
+from playwright.sync_api import Page
 from small_arrays import write_array
 
 from mvcodec.capture.picture_files import read_picture
 from mvcodec.container import read_info
+
+pytest_plugins = ("web_fixtures",)
 
 ROOT = Path(__file__).parents[1]
 
@@ -231,6 +235,15 @@ def test_the_page_says_where_an_anchor_is_ahead(array: Path, measured: Path, tmp
         assert bool(deltas[name]["anchor_ahead_kbps"]) == (found is not None)
         cell = words.format(**found or {})
         assert re.search(rf"<td>{label}</td>(<td>[^<]*</td>){{4}}<td>{re.escape(cell)}", page), (label, cell)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
+def test_the_page_shows_all_columns_on_a_screen_of_1200_px(tab: Page, measured: Path) -> None:
+    tab.set_viewport_size({"width": 1200, "height": 800})
+    tab.goto((measured / "report.html").as_uri())
+    hidden = "[...document.querySelectorAll('.scroll')].map((table) => table.scrollWidth - table.clientWidth)"
+    assert tab.evaluate(hidden) == [0, 0]
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 1200
 
 
 def plot(*arguments: str | Path) -> tuple[int, str]:

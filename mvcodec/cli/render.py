@@ -39,6 +39,8 @@ from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.synthesis.towards_enhanced import TowardsEnhanced, views_near
 
 QUILT = "quilt"
+STYLE_WORDS = dict.fromkeys(("sbs", "stereo", "3d"), "side-by-side") | {"red-cyan": "anaglyph"}
+"""What everyone else calls a style."""
 FROZEN_SECONDS = 2
 """How long a path takes while time stands."""
 
@@ -65,7 +67,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ROW,COL",
         help="viewpoint, in steps of the input's grid (default: middle); of a quilt or slice its row",
     )
-    parser.add_argument("--style", choices=STYLES, default="mono", help="default: %(default)s")
+    parser.add_argument(
+        "--style",
+        type=lambda text: STYLE_WORDS.get(text.lower(), text),
+        choices=STYLES,
+        default="mono",
+        help="default: %(default)s",
+    )
     add_setting(parser, ShotSettings, "focus_px", metavar="PX")
     add_setting(parser, ShotSettings, "convergence_px", metavar="PX")
     add_setting(parser, ShotSettings, "grid", parse=pair_of_sizes, metavar="RxC")

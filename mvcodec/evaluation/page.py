@@ -17,11 +17,12 @@ body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: #fff
 h1 { font-size: 1.5rem; margin: 0 0 .2rem; } h2 { font-size: 1.1rem; margin: 2.2rem 0 .4rem; }
 p, ul { max-width: 64rem; } p { margin: .4rem 0; } .soft { color: var(--soft); }
 .scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
-th, td { padding: .22rem .7rem; text-align: right; border-bottom: 1px solid var(--line);
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .85rem; }
+th, td { padding: .22rem .38rem; text-align: right; border-bottom: 1px solid var(--line);
   white-space: nowrap; }
 th { font-weight: 600; vertical-align: bottom; white-space: normal; }
-th:first-child, td:first-child { text-align: left; padding-left: 0; }
+th:first-child, td:first-child { text-align: left; padding-left: 0; white-space: normal; }
+td:first-child { min-width: 9rem; }
 tr.ours td { font-weight: 600; } tr.ours td:first-child { color: var(--ours); }
 tr.first td { border-top: 2px solid var(--line); }
 figure { margin: .6rem 0; } figure img { max-width: min(100%, 64rem); height: auto; }
@@ -151,9 +152,9 @@ def _figure(shown: Shown) -> str:
 
 def _points(document: Mapping[str, Any]) -> str:
     head = ["Curve", "QP", "kbit/s", "kbit a<br>frame set", "maps", "map<br>QP"]
-    head += [f"Y-PSNR dB<br>{kind}" for kind in ("all", "real", "virtual", "worst")]
-    head += ["YUV-PSNR dB<br>all", *(f"SSIM<br>{kind}" for kind in ("all", "virtual"))]
-    head += ["encode s", "of it<br>matching", "decode s"]
+    head += [f"Y&#8209;PSNR<br>dB, {kind}" for kind in ("all", "real", "virtual", "worst")]
+    head += ["YUV&#8209;PSNR<br>dB, all", *(f"SSIM<br>{kind}" for kind in ("all", "virtual"))]
+    head += ["encode<br>s", "of it<br>matching", "decode<br>s"]
     rows = []
     for curve in document["curves"]:
         for number, point in enumerate(curve["points"]):
