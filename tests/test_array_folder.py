@@ -45,6 +45,15 @@ def test_real_cameras_are_read_unless_others_are_asked_for(tmp_path: Path) -> No
         source.frame_sets(views=[(2, 0)])
 
 
+def test_a_file_of_ours_is_no_array_of_pictures(tmp_path: Path) -> None:
+    (tmp_path / "x.mcap").touch()
+    with pytest.raises(InputError, match=r"x\.mcap: found an MCAP file, expected an array folder or video"):
+        open_input(tmp_path / "x.mcap")
+    (tmp_path / "x.mp4").touch()
+    with pytest.raises(SettingError, match=r"grid: found nothing, expected an array folder, or `split` RxC"):
+        open_input(tmp_path / "x.mp4")
+
+
 def test_manifest_may_be_named_itself(tmp_path: Path) -> None:
     folder = make_folder(tmp_path)
     assert open_input([folder / "array.json"]).array == open_input([folder]).array

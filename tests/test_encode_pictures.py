@@ -132,7 +132,8 @@ def test_settings_are_checked_before_anything_is_written(tmp_path: Path) -> None
     for changes, message in (
         ({"qpp": 3}, "qpp: found no such setting, expected one of qp, crf, bitrate_kbps, rate, codec"),
         ({"qp": 99}, r"qp: found 99, expected a whole number, 1\.\.51"),
-        ({"fps": 0}, "array.fps: found 0, expected"),
+        ({"fps": 0}, "^fps: found 0, expected"),
+        ({"rho": -1}, "^rho: found -1, expected"),
         ({"real": "0x1"}, "found 0x1"),
         ({"gop": 31}, r"gop: found 31, expected 1\.\.30"),
     ):

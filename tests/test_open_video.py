@@ -49,6 +49,11 @@ def same(one: DecodedSet, other: DecodedSet) -> bool:
     )
 
 
+def test_another_policy_at_damage_is_refused_at_once(file: Path) -> None:
+    with pytest.raises(mvcodec.SettingError, match="on_error: found ignore, expected skip or stop"):
+        mvcodec.open(file, on_error="ignore")  # type: ignore[arg-type]
+
+
 def test_it_says_what_it_is(file: Path) -> None:
     with mvcodec.open(file) as video:
         assert (len(video), video.fps, video.codec) == (FRAMES, ARRAY.fps, "h264")

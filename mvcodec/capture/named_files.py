@@ -70,7 +70,8 @@ def _whole_grid(files: int, grid: tuple[int, int] | None, inside: tuple[int, int
     if grid is None and files == 1 and inside != (1, 1):
         return inside
     if grid is None:
-        raise SettingError("grid", "nothing", f"RxC for {files} video files in row order")
+        of_one = "an array folder, or `split` RxC where the one file holds several views"
+        raise SettingError("grid", "nothing", of_one if files == 1 else f"RxC for {files} files in row order")
     rows, cols = grid
     held = inside[0] * inside[1]
     if rows < 1 or cols < 1 or rows * cols != files * held:

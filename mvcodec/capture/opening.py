@@ -61,6 +61,9 @@ def open_input(
     for path in given:
         if not path.exists():
             raise InputError(path, "nothing there", "an array folder or a video file")
+        if path.suffix.lower() == ".mcap":
+            expected = "an array folder or video files; `mvcodec decode` makes such a folder of a coded file"
+            raise InputError(path, "an MCAP file", expected)
     if len(given) == 1 and (given[0].is_dir() or given[0].suffix.lower() == ".json"):
         return _open_folder(given[0], grid, real, timing, reading, originals)
     return _open_videos(given, grid, real, timing, reading, originals)

@@ -18,7 +18,7 @@ from mvcodec.closing import Closing
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.remote import is_url
 from mvcodec.container.shared_file import SharedFile
-from mvcodec.decoding.decoder import Decoder, OnError
+from mvcodec.decoding.decoder import ON_ERROR, Decoder, OnError
 from mvcodec.decoding.frame_store import CACHE_BYTES, FrameStore
 from mvcodec.errors import InputError, MvCodecWarning, NoSuchFrame
 from mvcodec.frames import DecodedSet, FloatMap, Picture, RenderedView
@@ -87,6 +87,7 @@ class Video(Closing):
         limits: Limits,
         enhancement: bool,
     ) -> None:
+        ON_ERROR.check(on_error)
         self._enhancement = enhancement
         self._synthesizers = _Synthesizers(synthesizer)
         self._matcher, self._on_error, self._limits = matcher, on_error, limits

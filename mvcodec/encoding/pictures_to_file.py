@@ -112,18 +112,21 @@ def _array(
         real_rows, real_cols = (tuple(sorted({place[axis] for place in views})) for axis in (0, 1))
     else:
         real_rows, real_cols = select_real(real, rows, cols)
-    return CameraArray(
-        rows=rows,
-        cols=cols,
-        width=width,
-        height=height,
-        fps=fps,
-        real_rows=real_rows,
-        real_cols=real_cols,
-        calibration=calibration or Calibration.nominal(width, height),
-        rho=rho,
-        name=name,
-    )
+    try:
+        return CameraArray(
+            rows=rows,
+            cols=cols,
+            width=width,
+            height=height,
+            fps=fps,
+            real_rows=real_rows,
+            real_cols=real_cols,
+            calibration=calibration or Calibration.nominal(width, height),
+            rho=rho,
+            name=name,
+        )
+    except SettingError as error:
+        raise SettingError(error.setting.removeprefix("array."), error.found, error.expected) from None
 
 
 def _frame_sets(array: CameraArray, frames: Iterator[tuple[int, ViewPictures]]) -> Iterator[FrameSet]:
