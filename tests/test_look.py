@@ -219,6 +219,20 @@ def test_rectify_tells_of_another_order(tmp_path: Path) -> None:
     assert "columns swapped" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--focal", "9"], "expected 48 to 48000 px"),
+        (["--focal", "500", "--fov", "60"], "not allowed with"),
+        (["--fov", "170"], "expected degrees up to 150"),
+        (["--focal", "500", "--board", "chessboard:9x6:25mm"], "--from scene"),
+    ],
+)
+def test_a_focal_length_that_cannot_be_is_refused(tmp_path: Path, options: list[str], words: str) -> None:
+    folder = write(tmp_path, room()[1])
+    assert words in fails(2, "rectify", folder, tmp_path / "rig.json", *options)
+
+
 def test_rectify_with_strict_stops_at_another_order(tmp_path: Path) -> None:
     _, pictures = room()
     folder = write(tmp_path, shown(pictures, COLUMNS))

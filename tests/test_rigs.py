@@ -97,6 +97,15 @@ def test_cameras_are_found_from_points_though_a_tenth_of_these_are_wrong() -> No
     assert before.rows.median > 3
 
 
+def test_a_focal_length_that_is_known_stays() -> None:
+    rig = a_rig()
+    tracks = points_seen(rig, 120)
+    grid = np.array([(col, row) for row, col in rig.cameras], float)
+    known, free = (adjust(tracks, grid, SIZE, 300.0, focal_known=said).cameras for said in (True, False))
+    assert np.exp(np.log(known.focal_px).mean()) == pytest.approx(300, rel=1e-3)
+    assert np.exp(np.log(free.focal_px).mean()) == pytest.approx(320, rel=0.03)
+
+
 def test_the_jacobian_is_that_of_the_residuals() -> None:
     from mvcodec.rigs.adjustment import _Problem
 

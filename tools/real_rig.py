@@ -60,6 +60,24 @@ def ranges(found: Calibrated, source: ArraySource, number: int, pixels: Vectors,
     return np.asarray(depth * np.hypot(1, np.hypot(ray[:, 0], ray[:, 1])))
 
 
+def compared(
+    one: Calibrated, other: Calibrated, source: ArraySource, number: int
+) -> tuple[float, float, float, float]:
+    """How far the first camera's distances by two calibrations are apart.
+
+    Returns:
+        The median share that they differ by, the median ratio, the median share once that is taken out, and
+        the share of the pixels of which both say something.
+    """
+    x, y = np.meshgrid(np.arange(0, source.array.width, 4.0), np.arange(0, source.array.height, 4.0))
+    pixels = np.column_stack([x.ravel(), y.ravel()])
+    ratios = ranges(other, source, number, pixels, (0, 0)) / ranges(one, source, number, pixels, (0, 0))
+    known = np.isfinite(ratios)
+    ratio = float(np.median(ratios[known]))
+    apart, alike = (float(np.median(np.abs(ratios[known] / by - 1))) for by in (1.0, ratio))
+    return apart, ratio, alike, float(known.mean())
+
+
 def side_by_side(pictures: list[Picture]) -> Picture:
     """With lines across, along which rows must agree."""
     beside = np.concatenate(pictures, axis=1)
@@ -92,16 +110,10 @@ def _tell(found: dict[str, Calibrated], source: ArraySource, arguments: argparse
         residuals = rectified_residuals(calibrated, source, new)
         focal = [round(camera.lens.focal_px[0], 1) for camera in calibrated.rig.cameras.values()]
         print(f"from {way}: rows {residuals.rows.text()}, focal lengths {focal} px, {calibrated.summary()}")
-    x, y = np.meshgrid(np.arange(0, source.array.width, 4.0), np.arange(0, source.array.height, 4.0))
-    pixels = np.column_stack([x.ravel(), y.ravel()])
-    one, other = (ranges(each, source, arguments.frame, pixels, (0, 0)) for each in found.values())
-    apart = np.abs(other / one - 1)
-    known = np.isfinite(apart)
-    ratio = float(np.median((other / one)[known]))
-    alike = float(np.median(np.abs((other / one)[known] / ratio - 1)))
+    apart, ratio, alike, known = compared(*found.values(), source, arguments.frame)
     print(
-        f"ranges: median {np.median(apart[known]):.2%} apart, ratio {ratio:.4f}, {alike:.2%} apart but for"
-        f" that, {known.mean():.0%} of the pixels"
+        f"ranges: median {apart:.2%} apart, ratio {ratio:.4f}, {alike:.2%} apart but for that, {known:.0%} of"
+        " the pixels"
     )
     if arguments.pictures is not None:
         _write(found, source, arguments)
