@@ -110,7 +110,7 @@ def _tell(found: dict[str, Calibrated], source: ArraySource, arguments: argparse
         residuals = rectified_residuals(calibrated, source, new)
         focal = [round(camera.lens.focal_px[0], 1) for camera in calibrated.rig.cameras.values()]
         print(f"from {way}: rows {residuals.rows.text()}, focal lengths {focal} px, {calibrated.summary()}")
-    apart, ratio, alike, known = compared(*found.values(), source, arguments.frame)
+    apart, ratio, alike, known = compared(found["file"], found["scene"], source, arguments.frame)
     print(
         f"ranges: median {apart:.2%} apart, ratio {ratio:.4f}, {alike:.2%} apart but for that, {known:.0%} of"
         " the pixels"
