@@ -177,6 +177,57 @@ def test_a_finger_drags_as_the_mouse_does(page: Page, server: Running) -> None:
     comes_to(page, 0, 1, 1 + 140 / 1080 * 2)
 
 
+def test_the_wheel_moves_ahead_and_back(page: Page, server: Running) -> None:
+    show(page, server)
+    before = pixels(page)
+    page.mouse.move(640, 300)
+    page.mouse.wheel(0, -600)
+    page.wait_for_selector("body[data-dolly='0.5'][data-scale='1'][data-quick='false']")
+    screenshot(page, "ahead")
+    assert psnr(before, pixels(page)) < 30
+    page.keyboard.press("s")
+    page.wait_for_selector("body[data-dolly='0.3']")
+    page.mouse.wheel(0, 2000)
+    page.wait_for_selector("body[data-dolly='0'][data-scale='1'][data-quick='false']")
+    assert psnr(before, pixels(page)) > SAME_DB
+
+
+def test_the_divider_has_the_picture_on_its_left_and_the_look_on_its_right(
+    page: Page, server: Running
+) -> None:
+    show(page, server)
+    picture = pixels(page)
+    assert page.is_hidden("#wipe")
+    page.locator("#look").select_option("disparity")
+    shows(page, look="disparity")
+    look = pixels(page)
+    page.locator("#wipe").fill("0.5")
+    half = picture.shape[1] // 2
+    page.wait_for_selector("body[data-wipe='0.5']")
+    both = pixels(page)
+    assert psnr(picture[:, : half - 8], both[:, : half - 8]) > SAME_DB
+    assert psnr(look[:, half + 8 :], both[:, half + 8 :]) > SAME_DB
+
+
+def test_the_view_follows_the_pointer_where_that_is_wanted_and_tells_what_is_under_it(
+    page: Page, server: Running
+) -> None:
+    show(page, server, "#frame=0&view=1,1&look=disparity")
+    page.mouse.move(500, 300)
+    page.wait_for_selector("#probe:has-text('px, ')")
+    assert on_screen(page) == (0, 1, 1)
+    page.keyboard.press("h")
+    page.mouse.move(370, 300)
+    # The picture is 1080 x 720.
+    comes_to(page, 0, 1 + (300 / 720 - 0.5) * 0.6, 1 + (370 - 640) / 1080 * 0.6)
+    screenshot(page, "probe")
+    page.keyboard.press("h")
+    page.keyboard.press("g")
+    comes_to(page, 0, 1, 1)
+    page.mouse.move(0, 0)
+    assert page.is_hidden("#probe")
+
+
 def test_moves_by_keys_and_on_the_map(page: Page, server: Running) -> None:
     show(page, server)
     page.keyboard.press("ArrowRight")

@@ -12,18 +12,21 @@ from mvcodec.array import Viewpoint
 from mvcodec.errors import InputError
 from mvcodec.player.messages import (
     MAX_MESSAGE_BYTES,
+    Dolly,
     Eyes,
     Loop,
     Measure,
     Message,
     Move,
     Play,
+    Probe,
     Ready,
     Seek,
     Show,
     Shown,
     Speed,
     Step,
+    Wipe,
     parse_message,
 )
 
@@ -37,6 +40,9 @@ LEGAL: list[tuple[str, Message]] = [
     ('{"type": "loop", "loop": false}', Loop(False)),
     ('{"type": "show", "look": "layers"}', Show("layers")),
     ('{"type": "eyes", "steps": 0.5}', Eyes(0.5)),
+    ('{"type": "dolly", "share": 0.2}', Dolly(0.2)),
+    ('{"type": "wipe", "share": 1}', Wipe(1.0)),
+    ('{"type": "probe", "x": 0, "y": 1}', Probe(0.0, 1.0)),
     ('{"type": "measure", "measure": true}', Measure(True)),
     ('{"type": "shown", "picture": 3}', Shown(3)),
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import http.client
 import ipaddress
+import json
 import random
 import sys
 from importlib.util import find_spec
@@ -20,6 +21,7 @@ from mvcodec.array import Viewpoint
 from mvcodec.capture import open_input
 from mvcodec.cli import play
 from mvcodec.decoding.decoder import Decoder
+from mvcodec.depth import depth_m
 from mvcodec.errors import MissingExtra
 from mvcodec.evaluation.metrics import psnr, ssim
 from mvcodec.player.access import AccessRules, is_loopback
@@ -114,6 +116,26 @@ def test_sends_the_picture_that_the_library_renders(
     assert (received.facts["row"], received.facts["col"], received.facts["frame"]) == (row, col, frame)
     assert received.facts["time_s"] == decoded.time_ns / 1e9
     assert psnr(expected, received.picture) > 35
+
+
+def test_tells_what_is_under_the_pointer(server: Running, file: Path) -> None:
+    with Decoder.open(file, slice(0, 1)) as decoder:
+        (decoded,) = decoder
+    view = make_synthesizer(SYNTHESIZER).render(decoded, Viewpoint(1, 1))
+    with Viewer(server) as viewer:
+        viewer.say("move", row=1, col=1)
+        viewer.say("ready")
+        viewer.next_picture()
+        viewer.say("probe", x=0.25, y=1)
+        told = next(
+            message for message in viewer.socket if isinstance(message, str) and "disparity" in message
+        )
+    place = json.loads(told)
+    expected = view.disparity_px[-1, view.disparity_px.shape[1] // 4]
+    assert place["disparity_px"] == pytest.approx(expected, abs=1.5)
+    assert place["depth_m"] == pytest.approx(
+        depth_m(decoded.array, view.disparity_px)[-1, view.disparity_px.shape[1] // 4], rel=0.1
+    )
 
 
 def test_measures_against_the_original(server: Running, file: Path, original: Path) -> None:

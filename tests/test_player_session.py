@@ -8,7 +8,21 @@ from hypothesis import strategies as st
 
 from mvcodec.array import Calibration, CameraArray, Viewpoint
 from mvcodec.player.clock import MAX_STALL_S, PlayClock
-from mvcodec.player.messages import Eyes, Loop, Message, Move, Play, Ready, Seek, Show, Shown, Speed, Step
+from mvcodec.player.messages import (
+    Dolly,
+    Eyes,
+    Loop,
+    Measure,
+    Message,
+    Move,
+    Play,
+    Ready,
+    Seek,
+    Show,
+    Shown,
+    Speed,
+    Step,
+)
 from mvcodec.player.session import MAX_IN_FLIGHT, PictureRequest, Session
 
 COUNT, FPS = 50, 10.0
@@ -46,6 +60,13 @@ def test_the_latest_viewpoint_wins() -> None:
         session.apply(Move(Viewpoint(0.0, col)), 0.0)
     assert request(session).viewpoint == Viewpoint(0.0, 3.25)
     assert session.next_request(0.0) is None
+
+
+def test_a_view_from_ahead_is_none_where_it_is_compared() -> None:
+    session = ready(Dolly(0.5))
+    assert request(session).dolly == 0.5
+    session.apply(Measure(True), 0.0)
+    assert request(session).dolly == 0
 
 
 @given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+
+from mvcodec.container.limits import DEFAULT_LIMITS
 
 ROOT = Path(__file__).parents[1]
 ROOM = ROOT / "web"
@@ -37,6 +41,16 @@ def test_the_bundle_asks_nothing_of_the_network_and_evaluates_no_text() -> None:
     assert "new Function(" not in script
     assert "eval(" not in script
     assert "</script" not in script.lower()
+
+
+def test_the_page_has_each_limit_of_the_python_reader() -> None:
+    text = (ROOM / "src" / "container" / "limits.ts").read_text("utf-8")
+    found = re.findall(r"(\w+): (\d+)(?: << (\d+))?,", text)
+    ours = {
+        "max_" + re.sub("([A-Z])", r"_\1", name).lower(): int(number) << int(shift or 0)
+        for name, number, shift in found
+    }
+    assert ours == asdict(DEFAULT_LIMITS)
 
 
 @pytest.mark.skipif(

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser_page import CHROMIUM, NO_CHROMIUM
+from command_line import fails, succeeds
 from player_files import Running, decode_picture, encode, playing, write_original
 from playwright.sync_api import Page, expect
-from web_fixtures import pixels_of, waits_for
+from web_fixtures import pixels_of, serve_folder, waits_for
 
 from mvcodec.capture import open_input
 from mvcodec.evaluation.metrics import psnr
@@ -70,6 +71,24 @@ def test_originals_are_served_where_there_are_some(server: Running, original: Pa
     for place in ("original/2/0/0.png", "original/0/3/0.png", "original/0/0/-1.png"):
         with pytest.raises(urllib.error.HTTPError, match="404"):
             urllib.request.urlopen(server.url + place)
+
+
+@pytest.mark.usefixtures("server")
+def test_a_page_for_any_server_has_the_originals_beside_it(tab: Page, original: Path, tmp_path: Path) -> None:
+    file = original.parent / "room.mcap"
+    refused = fails(2, "export-web", file, tmp_path, "--original", original, "--single-file")
+    assert "--original" in refused
+    succeeds("export-web", file, tmp_path, "--original", original, "--quiet")
+    saved = decode_picture(
+        np.frombuffer((tmp_path / "original" / "1" / "0" / "2.png").read_bytes(), np.uint8)
+    )
+    assert np.array_equal(saved, original_of(original, 1, (0, 2)))
+    assert len(list((tmp_path / "original").rglob("*.png"))) == 2 * 9
+    for site in serve_folder(tmp_path):
+        tab.goto(f"{site.url}/index.html?view=1,1")
+        tab.evaluate("document.querySelector('mvcodec-player').ready")
+        tab.get_by_label("Show").select_option("difference")
+        expect(tab.get_by_text("dB PSNR")).to_be_visible(timeout=PATIENCE_MS)
 
 
 def test_a_page_without_originals_does_not_offer_the_difference(tab: Page, original: Path) -> None:

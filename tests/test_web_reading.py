@@ -92,6 +92,16 @@ def test_a_large_file_starts_after_three_requests_and_two_megabytes(tab: Page, s
     (site.folder / "large.mcap").unlink()
 
 
+def test_a_connection_that_breaks_is_tried_again_and_then_told(tab: Page, site: Site) -> None:
+    site.put("whole.mcap", SAMPLE.read_bytes())
+    site.cuts = 2
+    assert read(tab, site, "whole.mcap", 0)["count"] == 6
+    site.cuts = 3  # as often as it is tried
+    assert "breaks off" in read(tab, site, "whole.mcap", 0)["refused"]
+    assert site.cuts == 0
+    assert read(tab, site, "whole.mcap", 0)["count"] == 6
+
+
 def test_a_file_that_breaks_off_is_used_up_to_there(tab: Page, site: Site) -> None:
     content = SAMPLE.read_bytes()
     site.put("whole.mcap", content)

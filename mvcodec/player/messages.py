@@ -89,6 +89,31 @@ class Eyes:
 
 
 @dataclass(frozen=True, slots=True)
+class Dolly:
+    """Look from ahead of the cameras' plane, by a share of the farthest that is allowed."""
+
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class Wipe:
+    """Show the picture itself on the left, over a share of the width, and the look beside it."""
+
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """Tell the disparity at a place of the picture that was sent last.
+
+    The place is in shares of the picture's size, from its upper left.
+    """
+
+    x: float
+    y: float
+
+
+@dataclass(frozen=True, slots=True)
 class Measure:
     """Measure each picture against the original, where there is one."""
 
@@ -102,7 +127,23 @@ class Shown:
     picture: int
 
 
-Message = Ready | Move | Seek | Step | Play | Speed | Loop | Section | Show | Eyes | Measure | Shown
+Message = (
+    Ready
+    | Move
+    | Seek
+    | Step
+    | Play
+    | Speed
+    | Loop
+    | Section
+    | Show
+    | Eyes
+    | Dolly
+    | Wipe
+    | Probe
+    | Measure
+    | Shown
+)
 
 
 def parse_message(text: str | bytes) -> Message:
@@ -160,6 +201,13 @@ def _speed(name: str, value: Any) -> float:
     return number
 
 
+def _share(name: str, value: Any) -> float:
+    number = _number(name, value)
+    if not 0 <= number <= 1:
+        raise InputError(name, _short(value), "0..1")
+    return number
+
+
 def _look(name: str, value: Any) -> str:
     if not isinstance(value, str) or value not in LOOKS:
         raise InputError(name, _short(value), f"one of {', '.join(LOOKS)}")
@@ -184,6 +232,9 @@ _FORMS: dict[str, tuple[dict[str, _Check], Callable[..., Message]]] = {
     "section": ({"first": _whole, "last": _whole}, Section),
     "show": ({"look": _look}, Show),
     "eyes": ({"steps": _number}, Eyes),
+    "dolly": ({"share": _share}, Dolly),
+    "wipe": ({"share": _share}, Wipe),
+    "probe": ({"x": _share, "y": _share}, Probe),
     "measure": ({"measure": _truth}, Measure),
     "shown": ({"picture": _whole}, Shown),
 }

@@ -32,9 +32,7 @@ class Originals:
     """
 
     def __init__(self, source: ArraySource, array: CameraArray) -> None:
-        ours, theirs = _shape(source.array), _shape(array)
-        if ours != theirs:
-            raise InputError(source.name, ours, f"{theirs} as in the file")
+        check_original(source, array)
         self._source = source
         self._cache: OrderedDict[tuple[int, Position], Picture] = OrderedDict()
         self._lock = threading.Lock()
@@ -78,6 +76,13 @@ class Originals:
             if len(self._cache) > MAX_CACHED:
                 self._cache.popitem(last=False)
             return found
+
+
+def check_original(source: ArraySource, array: CameraArray) -> None:
+    """Raise InputError where an original's grid or picture size is not that of a file."""
+    ours, theirs = _shape(source.array), _shape(array)
+    if ours != theirs:
+        raise InputError(source.name, ours, f"{theirs} as in the file")
 
 
 def _shape(array: CameraArray) -> str:

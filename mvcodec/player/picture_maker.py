@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 
 from mvcodec.array import Position, Viewpoint
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
@@ -19,6 +20,7 @@ from mvcodec.decoding.frame_store import Damage, FrameStore, StoredFrame
 from mvcodec.errors import StreamError
 from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.player import overlays
+from mvcodec.player.ahead import move_ahead
 from mvcodec.player.draft import QUICKER, SMALLER, Level, in_full_px, shrink
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.originals import Originals
@@ -43,12 +45,14 @@ class MadePicture:
         facts: plain JSON values: what is shown, what it cost in ms, legend, damage, quality.
         drawing_s: seconds of rendering and coding; what else it took was waiting for the frame set.
         damaged: it stands in for a frame that cannot be decoded.
+        view: what it shows, where that is one view.
     """
 
     jpeg: bytes
     facts: dict[str, Any]
     drawing_s: float
     damaged: bool
+    view: RenderedView | None = None
 
 
 class PictureMaker:
@@ -110,6 +114,9 @@ class PictureMaker:
         decoded, look = self._drafts.of(stored.decoded, request.level.scale), LOOKS[request.look]
         viewpoints = self._viewpoints(request)
         views = self._render(decoded, viewpoints, request.level)
+        if request.dolly > 0:
+            array, range_px = stored.decoded.array, stored.decoded.disparity_range_px
+            views = [move_ahead(view, array, range_px, request.dolly) for view in views]
         rendered = time.perf_counter()
         original = self._original(request, decoded)
         if original is None:
@@ -117,6 +124,9 @@ class PictureMaker:
             picture, legend = look.compose(shown, views)
         else:
             picture, legend = overlays.difference(views[0], original)
+        if len(views) == 1:
+            left = round(request.wipe * picture.shape[1])
+            picture = np.hstack([views[0].pixels[:, :left], picture[:, left:]])
         jpeg = to_jpeg(picture)
         done = time.perf_counter()
         facts = {
@@ -125,6 +135,8 @@ class PictureMaker:
             "time_s": self.store.table.times_ns[request.frame] / 1e9,
             "row": request.viewpoint.row,
             "col": request.viewpoint.col,
+            "dolly": request.dolly,
+            "wipe": request.wipe,
             "look": request.look,
             "scale": request.level.scale,
             "quick": request.level.quick,
@@ -136,7 +148,8 @@ class PictureMaker:
             "damage": stored.damage and self._describe(stored.damage),
             "quality": self._measure(request, decoded, views),
         }
-        return MadePicture(jpeg, facts, done - start, stored.damage is not None)
+        view = views[0] if len(views) == 1 else None
+        return MadePicture(jpeg, facts, done - start, stored.damage is not None, view)
 
     def close(self) -> None:
         """Let go of the file; waits for pictures being made ahead."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import math
 import struct
 import time
 from collections.abc import Awaitable, Callable
@@ -21,10 +22,12 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from mvcodec.depth import depth_m
 from mvcodec.errors import InputError, MvCodecError
+from mvcodec.frames import RenderedView
 from mvcodec.player.access import AccessRules
 from mvcodec.player.looks import LOOKS
-from mvcodec.player.messages import parse_message
+from mvcodec.player.messages import Probe, parse_message
 from mvcodec.player.picture_maker import MadePicture, PictureMaker
 from mvcodec.player.session import PictureRequest, Session
 
@@ -160,6 +163,7 @@ class _Viewer:
         self._news = asyncio.Event()
         self._stated: dict[str, Any] | None = None
         self._overtaken: asyncio.Future[MadePicture] | None = None
+        self._last: RenderedView | None = None
 
     async def run(self) -> None:
         sender = asyncio.create_task(self._send())
@@ -190,8 +194,31 @@ class _Viewer:
             if event["type"] == "websocket.disconnect":
                 raise WebSocketDisconnect(event.get("code", 1006))
             text = event.get("text")
-            self._session.apply(parse_message(text if text is not None else b""), time.monotonic())
+            message = parse_message(text if text is not None else b"")
+            if isinstance(message, Probe):
+                await self._tell_place(message)
+                continue
+            self._session.apply(message, time.monotonic())
             self._news.set()
+
+    async def _tell_place(self, probe: Probe) -> None:
+        """What is seen at a place of the picture that was sent last; nothing where it shows several views."""
+        view = self._last
+        if view is None:
+            return
+        height, width = view.disparity_px.shape
+        row, col = min(int(probe.y * height), height - 1), min(int(probe.x * width), width - 1)
+        found = view.disparity_px[row : row + 1, col : col + 1]
+        array = self._broadcast.maker.store.table.header.array
+        depth = float(depth_m(array, found)[0, 0]) if array.calibration.given else math.inf
+        facts = {
+            "type": "place",
+            "x": probe.x,
+            "y": probe.y,
+            "disparity_px": float(found[0, 0]),
+            "depth_m": depth if math.isfinite(depth) else None,
+        }
+        await self._socket.send_text(json.dumps(facts))
 
     async def _send(self) -> None:
         await self._socket.send_text(json.dumps(self._greeting()))
@@ -245,6 +272,7 @@ class _Viewer:
             "dropped": session.dropped,
         }
         head = json.dumps(facts, separators=(",", ":")).encode()
+        self._last = made.view
         await self._socket.send_bytes(struct.pack(">I", len(head)) + head + made.jpeg)
 
     async def _send_state(self) -> None:

@@ -17,6 +17,7 @@ from mvcodec.player.clock import PlayClock
 from mvcodec.player.draft import SMALLER, WHOLE, Level, Pace
 from mvcodec.player.looks import LOOKS
 from mvcodec.player.messages import (
+    Dolly,
     Eyes,
     Loop,
     Measure,
@@ -30,6 +31,7 @@ from mvcodec.player.messages import (
     Shown,
     Speed,
     Step,
+    Wipe,
 )
 from mvcodec.synthesis.towards_enhanced import views_near
 
@@ -59,6 +61,8 @@ class PictureRequest:
         viewpoint: within the array.
         look: a name of LOOKS.
         eye_steps: distance of two eyes in steps of the grid; 0 where the look is for one.
+        dolly: how far ahead of the cameras' plane, as a share of the farthest; 0 where views are compared.
+        wipe: share of the width, from the left, that shows the picture whatever the look.
         measure: against the original.
         level: how it is made.
         enhanced: what is done for the enhanced views near to it.
@@ -68,6 +72,8 @@ class PictureRequest:
     viewpoint: Viewpoint
     look: str = "picture"
     eye_steps: float = 0.0
+    dolly: float = 0.0
+    wipe: float = 0.0
     measure: bool = False
     level: Level = WHOLE
     enhanced: Enhanced = Enhanced.AT_HAND
@@ -121,13 +127,20 @@ class Session:
 
     def apply(self, message: Message, now_s: float) -> None:
         """Take one message from the page."""
-        clock = self._clock
         match message:
             case Ready():
                 self._ready = True
-            case Move(viewpoint):
-                self._wanted = replace(self._wanted, viewpoint=self._inside(viewpoint))
-                self._moved_s, self._keeps_up = now_s, True
+            case Shown(picture):
+                self._note_shown(picture, now_s)
+            case Seek() | Step() | Play() | Speed() | Loop() | Section():
+                self._steer(message, now_s)
+            case _:
+                self._want(message, now_s)
+
+    def _steer(self, message: Message, now_s: float) -> None:
+        """What is about the frame."""
+        clock = self._clock
+        match message:
             case Seek(frame):
                 clock.seek(frame, now_s)
             case Step(frames):
@@ -142,14 +155,24 @@ class Session:
                 clock.loop = loop
             case Section(first, last):
                 clock.set_section(first, last)
+
+    def _want(self, message: Message, now_s: float) -> None:
+        """What is about how a frame is shown."""
+        match message:
+            case Move(viewpoint):
+                self._wanted = replace(self._wanted, viewpoint=self._inside(viewpoint))
+                self._moved_s, self._keeps_up = now_s, True
+            case Dolly(share):
+                self._wanted = replace(self._wanted, dolly=share)
+                self._moved_s, self._keeps_up = now_s, True
+            case Wipe(share):
+                self._wanted = replace(self._wanted, wipe=share)
             case Show(look):
                 self._wanted = replace(self._wanted, look=look)
             case Eyes(steps):
                 self._eye_steps = min(max(steps, 0.0), float(self._array.cols - 1))
             case Measure(measure):
                 self._wanted = replace(self._wanted, measure=measure)
-            case Shown(picture):
-                self._note_shown(picture, now_s)
 
     def next_request(self, now_s: float) -> PictureRequest | None:
         """The picture to make now; None while there is nothing new, or the page is still busy."""
@@ -159,6 +182,8 @@ class Session:
         request = replace(self._wanted, frame=self._clock.advance(now_s), eye_steps=eye_steps)
         # A picture that stands, or that is measured or compared, is never a draft.
         is_exact = request.measure or request.look == "difference"
+        if is_exact:
+            request = replace(request, dolly=0.0)
         if (self._clock.playing or self._moving(now_s)) and not is_exact:
             request = replace(request, level=self._pace.level)
         if self._clock.playing and self._keeps_up and not self._moving(now_s):

@@ -39,14 +39,15 @@ def content_policy(scripts: str, styles: str, connections: str) -> str:
     )
 
 
-def linked_page(title: str, source: str, poster: str | None) -> str:
+def linked_page(title: str, source: str, poster: str | None, originals: str | None = None) -> str:
     """`index.html` beside its script, its style and the recording.
 
     Args:
         source, poster: names of the files beside it; without a poster the first picture is waited for.
+        originals: name of the folder beside it that holds what views are compared with.
     """
     policy = content_policy("'self'", "'self'", "* ws: wss: blob: data:")
-    return _filled(title, policy, _element(src=source, poster=poster))
+    return _filled(title, policy, _element(src=source, poster=poster, originals=originals))
 
 
 def single_page(title: str, recording: bytes | str, poster: str | None = None) -> str:

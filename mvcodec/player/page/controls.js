@@ -40,6 +40,7 @@ export class Controls {
     const { look, eyes } = this.player.wanted;
     $("look").value = look;
     $("eyes-box").hidden = !STEREO.includes(look);
+    $("wipe-box").hidden = look === "picture" || STEREO.includes(look);
     $("eyes").value = eyes;
     $("eyes-value").textContent = eyes.toFixed(2);
   }
@@ -90,6 +91,7 @@ export class Controls {
     $("speed").addEventListener("change", () => player.setSpeed(Number($("speed").value)));
     $("look").addEventListener("change", () => player.setLook($("look").value));
     $("eyes").addEventListener("input", () => player.setEyes(Number($("eyes").value)));
+    $("wipe").addEventListener("input", () => player.setWipe(Number($("wipe").value)));
     $("timeline").addEventListener("input", () => {
       this.scrubbing = true;
       player.seek(Number($("timeline").value));

@@ -1,5 +1,6 @@
 // The keys, in one table: it answers them and it writes the help.
 
+const AHEAD = 0.2; // of the farthest
 const ARROWS = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0] };
 
 export function keyTable(player) {
@@ -14,6 +15,8 @@ export function keyTable(player) {
       text: "look around (Shift: a whole step)",
       run: (event) => player.nudge(...ARROWS[event.key].map((steps) => steps * (event.shiftKey ? 4 : 1))),
     },
+    { keys: ["w", "s"], text: "move ahead, back", run: (event) => player.goAhead(event.key.toLowerCase() === "w" ? AHEAD : -AHEAD) },
+    { keys: ["h"], text: "follow the pointer, or not", run: () => player.hover.toggle() },
     { keys: ["g"], text: "to the nearest place of the array", run: () => player.snap() },
     { keys: ["-", "+"], text: "slower, faster", run: (event) => player.changeSpeed(event.key === "-" ? -1 : 1) },
     { keys: ["a", "b"], text: "loop from here, to here; again: off", run: (event) => player.mark(event.key === "a" ? 0 : 1) },

@@ -2,6 +2,7 @@
 
 import { Connection } from "./connection.js";
 import { Controls, LOOKS, STEREO } from "./controls.js";
+import { Hover } from "./hover.js";
 import { copyLink, savePicture } from "./keep.js";
 import { drawLegend } from "./legend.js";
 import { Link, readLink } from "./link.js";
@@ -10,6 +11,7 @@ import { Section } from "./section.js";
 import { Stage } from "./stage.js";
 import { Stats } from "./stats.js";
 import { Sway } from "./sway.js";
+import { damageText, showQuality } from "./told.js";
 
 const NUDGE = 0.25; // steps of the grid
 const EYES_STEP = 0.05;
@@ -30,7 +32,7 @@ const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 class Player {
   constructor() {
     this.facts = null;
-    this.wanted = { frame: 0, row: null, col: null, look: "picture", eyes: null, measure: false, ...readLink() };
+    this.wanted = { frame: 0, row: null, col: null, look: "picture", eyes: null, dolly: 0, wipe: 0, measure: false, ...readLink() };
     this.isViewGiven = this.wanted.row !== null;
     this.playback = { playing: false, speed: 1, loop: false, section: null };
     this.section = new Section();
@@ -43,9 +45,12 @@ class Player {
     this.stage = new Stage($("stage"), {
       touched: () => this.touched(),
       moved: (rows, cols) => this.drag(rows, cols),
+      ahead: (by) => this.goAhead(by),
+      hovered: (at) => this.hover.move(at),
       clicked: () => this.togglePlay(),
       doubleClicked: () => this.toggleFullscreen(),
     });
+    this.hover = new Hover(this, $("probe"));
     this.drawing = Promise.resolve();
     this.controls = new Controls(this);
     this.connection = new Connection(this);
@@ -71,6 +76,8 @@ class Player {
     send("seek", { frame: wanted.frame });
     send("show", { look: wanted.look });
     send("eyes", { steps: wanted.eyes });
+    send("dolly", { share: wanted.dolly });
+    send("wipe", { share: wanted.wipe });
     send("measure", { measure: wanted.measure });
     send("speed", { factor: this.playback.speed });
     send("loop", { loop: this.playback.loop });
@@ -95,6 +102,10 @@ class Player {
     this.warn(message);
   }
 
+  place(found) {
+    this.hover.answered(found);
+  }
+
   picture(facts, blob) {
     // One after the other: two bitmaps decoded at once may be done in the wrong order.
     this.drawing = this.drawing
@@ -115,6 +126,7 @@ class Player {
   away(reason) {
     $("connection").textContent = `${reason} Trying again …`;
     $("connection").hidden = false;
+    this.hover.forget();
     document.body.classList.add("away");
   }
 
@@ -123,6 +135,13 @@ class Player {
   drag(rows, cols) {
     const { facts, wanted } = this;
     if (facts) this.moveTo(wanted.row + rows * (facts.rows - 1), wanted.col + cols * (facts.cols - 1));
+  }
+
+  // Ahead into the picture, or back, by a share of the farthest.
+  goAhead(by) {
+    if (!this.facts) return;
+    this.wanted.dolly = clamp(this.wanted.dolly + by, 0, 1);
+    this.send("dolly", { share: this.wanted.dolly });
   }
 
   nudge(rows, cols) {
@@ -135,11 +154,12 @@ class Player {
     this.moveTo(Math.round(this.wanted.row), Math.round(this.wanted.col));
   }
 
-  moveTo(row, col) {
+  moveTo(row, col, hovers = false) {
     const { facts, wanted } = this;
     if (!facts) return;
     wanted.row = clamp(row, 0, facts.rows - 1);
     wanted.col = clamp(col, 0, facts.cols - 1);
+    if (!hovers) this.hover.settle();
     if (this.moveDue) return;
     // The latest place wins: one message for each picture of the screen at most.
     this.moveDue = true;
@@ -225,6 +245,11 @@ class Player {
     this.controls.showLook();
   }
 
+  setWipe(share) {
+    this.wanted.wipe = share;
+    this.send("wipe", { share });
+  }
+
   toggleMeasure() {
     if (!this.facts?.measurable) {
       this.warn("There is nothing to measure against: start with --original ARRAY");
@@ -277,11 +302,11 @@ class Player {
     this.controls.showTime(time, shown.frame);
     this.map.show(shown, wanted);
     drawLegend($("legend"), shown.legend);
-    this.showQuality(shown.quality);
-    this.showDamage(shown);
+    showQuality($("quality"), shown.quality);
+    if (shown.damage) this.warn(damageText(shown));
     if (!this.sway.isOn) this.link.write({ ...shown, eyes: wanted.eyes }, STEREO.includes(shown.look));
-    const { look, frame, row, col, scale, quick } = shown;
-    Object.assign(document.body.dataset, { look, frame, row, col, scale, quick });
+    const { look, frame, row, col, dolly, wipe, scale, quick } = shown;
+    Object.assign(document.body.dataset, { look, frame, row, col, dolly, wipe, scale, quick });
   }
 
   firstShown() {
@@ -299,20 +324,6 @@ class Player {
     this.isTouched = true;
     this.sway.end();
     $("hint").hidden = true;
-  }
-
-  showQuality(quality) {
-    $("quality").hidden = !quality;
-    document.body.classList.toggle("measured", Boolean(quality));
-    if (!quality) return;
-    const ssim = quality.ssim === null ? "" : ` · SSIM ${quality.ssim.toFixed(4)}`;
-    $("quality").textContent = quality.reason ?? `PSNR ${quality.psnr_db.toFixed(2)} dB${ssim}`;
-  }
-
-  showDamage({ damage, frame }) {
-    if (!damage) return;
-    const on = damage.goes_on_s === null ? "to the end" : `until ${damage.goes_on_s.toFixed(3)} s`;
-    this.warn(`Damage: frame ${frame} cannot be decoded (from ${damage.time_s.toFixed(3)} s ${on}); the nearest whole one is shown. ${damage.message}`);
   }
 
   warn(text) {

@@ -1,24 +1,34 @@
-// The picture: draws it, and turns dragging into moves.
+// The picture: draws it, and turns dragging, hovering, the wheel and two fingers into moves.
 
 const STILL_PX = 5; // a pointer that moved less was not dragged
 const DOUBLE_MS = 280;
+const WHEEL = 1 / 1200; // what the wheel's pixels are worth
+const PINCH = 0.5; // and the logarithm of a pinch
 
 export class Stage {
-  // `moved(rows, cols)`: by how many spans of the array; `clicked` comes after it is known to be no double click.
-  constructor(element, { touched, moved, clicked, doubleClicked }) {
+  // `moved(rows, cols)`: by how many spans of the array; `ahead(by)`: a share of the farthest; `hovered(at)`: in shares of the
+  // picture from its upper left, null where the pointer left it; `clicked` comes after it is known to be no double click.
+  constructor(element, handlers) {
     this.element = element;
+    this.handlers = handlers;
     this.canvas = element.querySelector("canvas");
     this.context = this.canvas.getContext("2d", { alpha: false });
-    this.last = null;
+    this.pointers = new Map();
     this.start = null;
     this.click = null;
     element.addEventListener("pointerdown", (event) => {
-      touched();
+      handlers.touched();
       this.grab(event);
     });
-    element.addEventListener("pointermove", (event) => this.drag(event, moved));
-    element.addEventListener("pointerup", (event) => this.release(event) && this.count(clicked, doubleClicked));
+    element.addEventListener("pointermove", (event) => this.move(event));
+    element.addEventListener("pointerup", (event) => this.release(event) && this.count());
     element.addEventListener("pointercancel", (event) => this.release(event));
+    element.addEventListener("pointerleave", () => handlers.hovered(null));
+    element.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      handlers.touched();
+      handlers.ahead(-event.deltaY * WHEEL);
+    }, { passive: false });
   }
 
   async draw(blob) {
@@ -33,44 +43,78 @@ export class Stage {
   }
 
   grab(event) {
-    if (event.button !== 0 || this.last) return;
-    this.last = { id: event.pointerId, x: event.clientX, y: event.clientY };
-    this.start = this.last;
-    this.dragged = false;
+    if (event.button !== 0) return;
+    this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
     this.element.setPointerCapture(event.pointerId);
     this.element.classList.add("dragging");
+    this.dragged = this.pointers.size > 1;
+    if (!this.dragged) this.start = { x: event.clientX, y: event.clientY };
   }
 
-  drag(event, moved) {
-    const last = this.last;
-    if (!last || event.pointerId !== last.id) return;
+  move(event) {
+    const { handlers, pointers } = this;
+    const last = pointers.get(event.pointerId);
+    if (!last) {
+      handlers.hovered(this.placeOf(event));
+      return;
+    }
+    const spread = this.spread();
+    pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    if (pointers.size > 1) {
+      if (spread > 0) handlers.ahead(PINCH * Math.log(this.spread() / spread));
+      return;
+    }
     this.dragged ||= Math.hypot(event.clientX - this.start.x, event.clientY - this.start.y) > STILL_PX;
-    if (!this.dragged) return;
+    if (!this.dragged) {
+      pointers.set(event.pointerId, last);
+      return;
+    }
     const { width, height } = this.shown();
     // The scene follows the finger: the viewpoint goes the other way.
-    moved((last.y - event.clientY) / height, (last.x - event.clientX) / width);
-    this.last = { id: last.id, x: event.clientX, y: event.clientY };
+    handlers.moved((last.y - event.clientY) / height, (last.x - event.clientX) / width);
   }
 
   // True where the pointer was not dragged.
   release(event) {
-    if (!this.last || event.pointerId !== this.last.id) return false;
-    this.last = null;
-    this.element.classList.remove("dragging");
+    if (!this.pointers.delete(event.pointerId)) return false;
+    if (this.pointers.size === 0) this.element.classList.remove("dragging");
     return !this.dragged;
   }
 
-  count(clicked, doubleClicked) {
+  count() {
     if (this.click !== null) {
       clearTimeout(this.click);
       this.click = null;
-      doubleClicked();
+      this.handlers.doubleClicked();
       return;
     }
     this.click = setTimeout(() => {
       this.click = null;
-      clicked();
+      this.handlers.clicked();
     }, DOUBLE_MS);
+  }
+
+  // Distance of two fingers, px.
+  spread() {
+    const [one, other] = [...this.pointers.values()];
+    return one && other ? Math.hypot(one.x - other.x, one.y - other.y) : 0;
+  }
+
+  // In shares of the picture from its upper left.
+  placeOf(event) {
+    const box = this.element.getBoundingClientRect();
+    const { width, height } = this.shown();
+    return {
+      x: 0.5 + (event.clientX - box.left - box.width / 2) / width,
+      y: 0.5 + (event.clientY - box.top - box.height / 2) / height,
+    };
+  }
+
+  // Where a place of the picture is in the window, px.
+  windowPx({ x, y }) {
+    const box = this.element.getBoundingClientRect();
+    const { width, height } = this.shown();
+    return { x: box.left + box.width / 2 + (x - 0.5) * width, y: box.top + box.height / 2 + (y - 0.5) * height };
   }
 
   // The size of the picture in the window, px.

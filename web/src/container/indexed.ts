@@ -7,7 +7,7 @@ import { checkLimit, FileError } from "./limits.ts";
 import { HEADER_TOPIC, type FrameSet } from "./messages.ts";
 import type { Recording, Span } from "./recording.ts";
 import { RecordReader, unpack } from "./records.ts";
-import type { Source } from "./sources.ts";
+import { ConnectionLost, type Source } from "./sources.ts";
 
 type ChunkIndex = TypedMcapRecords["ChunkIndex"];
 
@@ -20,6 +20,8 @@ const MESSAGE_INDEX_ENTRY = 16;
 const MESSAGE_BYTES = 31n;
 /** Frame sets that are kept for another look, in bytes of what is coded. */
 const KEPT_BYTES = 1 << 26;
+/** What was lost with the connection is asked for again after so long, ms. */
+const LOST_MS = 1000;
 const VIDEO_TOPIC = /^\/camera\/r\d{2,}_c\d{2,}\/video$/;
 
 /** The index of a file, or undefined where it has none (it grows, or was cut). Throws where it is damaged. */
@@ -115,6 +117,7 @@ export class IndexedRecording implements Recording {
       return sets;
     } catch (error) {
       this.#failure ??= error;
+      if (error instanceof ConnectionLost) setTimeout(() => this.#kept.delete(this.spans.indexOf(span)), LOST_MS);
       const from = (Number(span.startNs) / 1e9).toFixed(3);
       this.#tell(`${from}..${(Number(span.endNs) / 1e9).toFixed(3)} s: damage (${(error as Error).message})`);
       return [];

@@ -21,9 +21,15 @@ const KEPT_BYTES = 1 << 26;
 /** Where a server has no ranges, the whole file is taken, up to this size. */
 const MOST_WHOLE_BYTES = 1 << 30;
 
+/** A range is asked for again where the connection breaks, after so many ms. */
+const AGAIN_MS = [200, 1000];
+
 const OK = 200;
 const PARTIAL = 206;
 const NOT_SATISFIABLE = 416;
+
+/** A server that does not answer, or an answer that breaks off: later it may be otherwise. */
+export class ConnectionLost extends FileError {}
 
 export class BytesSource implements Source {
   readonly traffic = { requests: 0, bytes: 0 };
@@ -103,12 +109,24 @@ export class HttpSource implements Source {
   }
 
   async #range(start: number, end: number): Promise<void> {
+    for (const wait of AGAIN_MS) {
+      try {
+        return await this.#ask(start, end);
+      } catch (error) {
+        if (!(error instanceof ConnectionLost)) throw error;
+        await new Promise((resolve) => setTimeout(resolve, wait));
+      }
+    }
+    return this.#ask(start, end);
+  }
+
+  async #ask(start: number, end: number): Promise<void> {
     this.traffic.requests++;
     let answer: Response;
     try {
       answer = await this.#fetch(this.#url, { headers: { Range: `bytes=${start}-${end - 1}` } });
     } catch {
-      throw new FileError(`no answer for ${this.#url}`, "a server that can be reached and allows this page");
+      throw new ConnectionLost(`no answer for ${this.#url}`, "a server that can be reached and allows this page");
     }
     if (answer.status === NOT_SATISFIABLE) return;
     if (answer.status !== OK && answer.status !== PARTIAL) {
@@ -135,7 +153,7 @@ export class HttpSource implements Source {
     if (size <= most) size = 0;
     const reader = answer.body?.getReader();
     while (size <= most) {
-      const { done, value } = (await reader?.read()) ?? { done: true, value: undefined };
+      const { done, value } = (await reader?.read().catch(() => this.#brokenOff(size))) ?? { done: true, value: undefined };
       if (done || value === undefined) break;
       size += value.length;
       parts.push(value);
@@ -152,6 +170,10 @@ export class HttpSource implements Source {
       at += part.length;
     }
     return bytes;
+  }
+
+  #brokenOff(size: number): never {
+    throw new ConnectionLost(`an answer from ${this.#url} that breaks off after ${size} bytes`, "the range that was asked for");
   }
 
   #keep(block: Block): void {

@@ -6,6 +6,7 @@ import { openRecording } from "../container/open.ts";
 import { frameAt, frameCount, timeOf, type Recording } from "../container/recording.ts";
 import type { Source } from "../container/sources.ts";
 import { camerasOf, clampView, type Viewpoint } from "../geometry.ts";
+import type { CameraFrame } from "../synthesis/camera_textures.ts";
 import { finished } from "../synthesis/gl.ts";
 import { ViewRenderer, type Pixels } from "../synthesis/renderer.ts";
 import { drawShown, viewsShown } from "./drawing.ts";
@@ -13,7 +14,7 @@ import { Immersive, type Due } from "./immersive.ts";
 import { measure, Originals } from "./originals.ts";
 import { Playback } from "./playback.ts";
 import { placed, type EngineEvents, type Opening, type Shown } from "./shown.ts";
-import { Standing } from "./standing.ts";
+import { PART, Standing } from "./standing.ts";
 import { Supply } from "./supply.ts";
 import { Tempo } from "./tempo.ts";
 import { Waiters } from "./waiters.ts";
@@ -39,6 +40,7 @@ export class Engine {
   /** What is on the screen has all detail; what is drawn next is to have it. */
   #isFinal = false;
   #isFinalDue = false;
+  #isGuessed = false;
   #drawnView: Viewpoint | undefined;
   #tick: number | undefined;
   readonly #standing = new Standing(() => this.#stands());
@@ -238,6 +240,10 @@ export class Engine {
   /** Look whether there is something to do, with the next picture of the screen. */
   wake(): void {
     this.#isDirty = true;
+    this.#schedule();
+  }
+
+  #schedule(): void {
     if (this.#tick === undefined && !this.isClosed && this.#immersive === undefined) this.#tick = requestAnimationFrame((now) => this.#run(now));
   }
 
@@ -258,24 +264,39 @@ export class Engine {
     const hasOriginal = this.originals?.prepare(this.#renderer, this.#supply?.decoded?.sequence, this.shown) ?? true;
     if (isReady && hasOriginal && this.#isDirty && this.#supply?.decoded !== undefined) {
       this.#isDirty = false;
-      const isFinal = this.#isFinalDue || this.tempo.isQuick;
-      this.#draw(isFinal);
+      const isMoved = this.#drawnView !== this.shown.view;
+      this.#draw(this.#isFinalDue || this.tempo.allowsFine(this.#standing.costMs));
       this.psnr = this.#isFinalDue ? measure(this.#renderer, this.#supply.decoded.frames, this.view) : undefined;
-      if (!isFinal) this.tempo.drawn(now);
-      else if (this.#isFinalDue) void this.#standing.time(finished(this.#renderer!.gl));
+      if (this.#isFinalDue) void this.#standing.time(finished(this.#renderer!.gl));
+      else this.tempo.drawn(now, isMoved ? 0 : this.#framePeriodMs);
+      if (!this.#isGuessed && this.tempo.allowsFine(this.#standing.costMs ?? 0)) void this.#guess(this.#renderer!, this.#supply.decoded.frames);
       this.#isFinalDue = false;
       this.#events.onFrame();
       this.#standing.moved();
     }
     this.#waiters.look();
-    if (this.playback.isPlaying) this.wake();
+    if (this.playback.isPlaying) this.#schedule();
+  }
+
+  /** Whether pictures in all detail are worth a try while it moves, as it may do from the start. */
+  async #guess(renderer: ViewRenderer, frames: readonly CameraFrame[]): Promise<void> {
+    this.#isGuessed = true;
+    const draw = () => (renderer.drawMiddle(frames, this.view, PART), finished(renderer.gl));
+    if (this.#standing.costMs !== undefined || !(await this.#standing.guess(draw)) || this.isClosed) return;
+    this.#isFinalDue = true;
+    this.wake();
+  }
+
+  /** From one frame to the next while it plays, ms; else 0. */
+  get #framePeriodMs(): number {
+    return this.playback.isPlaying ? 1000 / (this.header.fps * this.playback.speed) : 0;
   }
 
   /** What is to be drawn for a headset, whose own clock comes in place of the screen's. */
   #due(now: number, views: readonly Viewpoint[]): Due {
     this.#playOn(now);
     if (this.#fetch(views)) this.#isDirty = false;
-    this.tempo.drawn(now);
+    this.tempo.drawn(now, 0);
     this.#waiters.look();
     return { frames: this.#supply?.decoded?.frames, shown: this.shown, detail: this.tempo.detail };
   }
@@ -291,7 +312,9 @@ export class Engine {
   #playOn(now: number): void {
     const { playback } = this;
     if (!playback.isPlaying) return;
-    this.shown.frame = this.frameAt(playback.timeAt(now));
+    const frame = this.frameAt(playback.timeAt(now));
+    this.#isDirty ||= frame !== this.shown.frame;
+    this.shown.frame = frame;
     if (!playback.isPlaying) this.#events.onState();
   }
 

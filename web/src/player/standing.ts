@@ -5,12 +5,17 @@ const STANDS_MS = 120;
 /** The same where pictures in all detail take long: one that comes too early holds up whoever still moves. */
 const LONGEST_MS = 1000;
 
+/** Share of a picture's sides that is drawn to guess how long a whole one takes; where the part takes longer, the whole does too. */
+export const PART = 0.25;
+const PART_MS = 25;
+
 export class Standing {
   readonly #onStands: () => void;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isHeld = false;
   #isDue = false;
-  #costMs = 0;
+  /** How long the last picture in all detail took; undefined before the first one. */
+  costMs: number | undefined;
 
   constructor(onStands: () => void) {
     this.#onStands = onStands;
@@ -18,7 +23,7 @@ export class Standing {
 
   /** How long nothing must change, ms. */
   get patience(): number {
-    return Math.min(Math.max(STANDS_MS, this.#costMs), LONGEST_MS);
+    return Math.min(Math.max(STANDS_MS, this.costMs ?? 0), LONGEST_MS);
   }
 
   /** Something has changed. */
@@ -37,7 +42,7 @@ export class Standing {
 
   /** A picture in all detail took so long, ms. */
   took(ms: number): void {
-    this.#costMs = ms;
+    this.costMs = ms;
   }
 
   /** A picture in all detail has been begun: those who move on at once should not wait for it again. */
@@ -45,6 +50,15 @@ export class Standing {
     const since = performance.now();
     await drawn;
     this.took(performance.now() - since);
+  }
+
+  /** As long as nothing has stood: guess by a part of such a picture, which `draw` begins; whether it may be quick enough to be worth a whole one. */
+  async guess(draw: () => Promise<void>): Promise<boolean> {
+    const since = performance.now();
+    await draw();
+    const ms = performance.now() - since;
+    if (ms > PART_MS) this.costMs ??= ms / PART ** 2;
+    return ms <= PART_MS;
   }
 
   close(): void {

@@ -1,29 +1,40 @@
 /** How much detail a moving picture gets: less where the pictures come too slowly. */
 
-/** Pictures are to come at least so often. */
-const SLOW_MS = 42;
+/** Pictures are to come at least so often, ms; more detail is tried where they come so much sooner. */
+const SLOW_MS = 33;
 const FAST_MS = 21;
+/** The same while nothing but frames changes the picture, in times between two frames. */
+const LATE = 1.3;
+const IN_TIME = 1.1;
 /** A longer pause is none of the GPU's. */
 const PAUSE_MS = 400;
 /** Share of the newest interval in the mean. */
 const NEWEST = 0.25;
-const DETAILS = [1, 0.75, 0.5, 0.375] as const;
+/** Pictures after which less detail is taken, and more is tried: twice as many after each time that it was too much. */
+const FALL_AFTER = 6;
+const RISE_AFTER = 60;
+const MOST_PATIENCE = 16 * RISE_AFTER;
+const DETAILS = [1, 0.75, 0.5, 0.375, 0.25] as const;
 
 export class Tempo {
   #level = 0;
   #last: number | undefined;
   #mean = FAST_MS;
-  /** Since the level changed. */
+  /** Pictures since the level changed. */
   #count = 0;
+  #patience = RISE_AFTER;
+  /** This level came by trying more. */
+  #isTried = false;
+  #isInTime = true;
 
   /** Of the picture's size each way. */
   get detail(): number {
     return DETAILS[this.#level];
   }
 
-  /** Moving pictures may be as fine as those that stand. */
-  get isQuick(): boolean {
-    return this.#level === 0 && this.#mean < 0.8 * FAST_MS && this.#count > 30;
+  /** Whether moving pictures may be as fine as one that stands, which took `costMs`; undefined: none has stood yet. */
+  allowsFine(costMs: number | undefined): boolean {
+    return costMs !== undefined && costMs < FAST_MS && this.#level === 0 && this.#isInTime && this.#count > RISE_AFTER / 2;
   }
 
   /** Mean time between pictures while they move, ms. */
@@ -31,16 +42,19 @@ export class Tempo {
     return this.#mean;
   }
 
-  /** A picture was drawn while it moves. */
-  drawn(now: number): void {
+  /** A picture was drawn while it moves; `periodMs`: when the next one is due where only frames change it, else 0. */
+  drawn(now: number, periodMs: number): void {
     const interval = this.#last === undefined ? undefined : now - this.#last;
     this.#last = now;
-    if (interval === undefined || interval > PAUSE_MS) return;
+    if (interval === undefined || interval > PAUSE_MS + periodMs) return;
     this.#mean += NEWEST * (interval - this.#mean);
     this.#count++;
-    if (this.#count < 6) return;
-    if (this.#mean > SLOW_MS && this.#level < DETAILS.length - 1) this.#change(1);
-    else if (this.#mean < FAST_MS && this.#level > 0 && this.#count > 60) this.#change(-1);
+    this.#isInTime = this.#mean < Math.max(FAST_MS, IN_TIME * periodMs);
+    if (this.#count < FALL_AFTER) return;
+    if (this.#mean > Math.max(SLOW_MS, LATE * periodMs) && this.#level < DETAILS.length - 1) {
+      if (this.#isTried && this.#count < RISE_AFTER) this.#patience = Math.min(2 * this.#patience, MOST_PATIENCE);
+      this.#change(1);
+    } else if (this.#isInTime && this.#level > 0 && this.#count > this.#patience) this.#change(-1);
   }
 
   /** The picture stands: the next interval is no measure. */
@@ -50,6 +64,7 @@ export class Tempo {
 
   #change(by: number): void {
     this.#level += by;
+    this.#isTried = by < 0;
     this.#count = 0;
     this.#mean = 0.5 * (SLOW_MS + FAST_MS);
   }

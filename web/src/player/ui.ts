@@ -23,6 +23,8 @@ import { Tilt } from "./tilt.ts";
 
 const HINT_MS = 4000;
 const PEEK_PX = 160;
+/** While it plays, what stands beside the picture changes no more often: each change costs as much as a picture where there is no GPU. */
+const UPDATE_MS = 200;
 
 export class Ui {
   readonly #host: HTMLElement;
@@ -47,6 +49,7 @@ export class Ui {
   #section = new Section();
   #isTouched = false;
   #hasPlayed = false;
+  #updatedAt = 0;
   readonly #idle: Idle;
   #stop = new AbortController();
 
@@ -131,12 +134,14 @@ export class Ui {
   drawn(): void {
     this.#poster.hidden = true;
     this.wait(undefined);
-    this.update();
+    const isDue = !this.#engine?.playback.isPlaying || performance.now() - this.#updatedAt > UPDATE_MS;
+    if (isDue) this.update();
   }
 
   update(): void {
     const engine = this.#engine;
     if (engine === undefined || !engine.isOpen) return;
+    this.#updatedAt = performance.now();
     const { playback, shown } = engine;
     this.#hasPlayed ||= playback.isPlaying;
     if (this.#hasPlayed) this.#big.hidden = true;

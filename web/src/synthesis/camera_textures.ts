@@ -38,8 +38,6 @@ export class CameraTextures {
   readonly #slots: (Slot | undefined)[] = Array(SLOTS).fill(undefined);
   readonly #layerTarget: WebGLFramebuffer;
   readonly #pairs: Uint8Array;
-  /** Goes up with every map that comes. */
-  version = 0;
 
   constructor(gl: WebGL2RenderingContext, header: Header) {
     this.#gl = gl;
@@ -56,17 +54,16 @@ export class CameraTextures {
   }
 
   /** Make these cameras ready, four at most; returns each one's layer. What is there already stays. */
-  place(frames: readonly CameraFrame[], isFine: boolean): number[] {
+  place(frames: readonly CameraFrame[]): number[] {
     const isOf = (frame: CameraFrame) => (slot: Slot | undefined) => slot?.picture === frame.picture && slot.map === frame.map;
     for (const frame of frames) {
       if (this.#slots.some(isOf(frame))) continue;
       const layer = this.#slots.findIndex((slot) => slot === undefined || !frames.some((one) => isOf(one)(slot)));
       this.#slots[layer] = { ...frame, isPrepared: false };
       this.#upload(layer, frame);
-      this.version++;
     }
     const layers = frames.map((frame) => this.#slots.findIndex(isOf(frame)));
-    if (isFine) layers.forEach((layer) => this.#prepareLayer(layer));
+    layers.forEach((layer) => this.#prepareLayer(layer));
     return layers;
   }
 

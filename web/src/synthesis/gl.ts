@@ -128,10 +128,11 @@ export class Texture implements Bindable {
     clampAndFilter(gl, gl.TEXTURE_2D);
   }
 
-  upload(pixels: ImageData): void {
+  /** `pixels`: RGBA, of the texture's size or of a part of it that begins where the texture does. */
+  upload(pixels: Uint8Array | Uint8ClampedArray, width = this.width, height = this.height): void {
     const gl = this.#gl;
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
   }
 
   bind(unit: number): void {

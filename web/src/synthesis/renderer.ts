@@ -2,11 +2,11 @@
 
 import type { Header } from "../container/header.ts";
 import { contributors, infinityOf, type Viewpoint } from "../geometry.ts";
-import { Bounds } from "./bounds.ts";
+import { BLOCK, Bounds } from "./bounds.ts";
 import { CameraTextures, SLOTS, type CameraFrame } from "./camera_textures.ts";
-import draftFragment from "./draft.frag.glsl";
+import copyFragment from "./copy.frag.glsl";
+import { Draft, type DraftCamera } from "./draft.ts";
 import fullVertex from "./full.vert.glsl";
-import geometryFragment from "./geometry.frag.glsl";
 import { framebufferOf, makeProgram, Texture, type Program } from "./gl.ts";
 import searchShader from "./search.glsl";
 import viewFragment from "./view.frag.glsl";
@@ -41,13 +41,8 @@ export interface Pixels {
   readonly data: Uint8Array;
 }
 
-/** px, each way, of the tiles that a picture's bounds are kept of: larger ones cost less to make and more to search. */
-const FINE_BLOCK = 8;
-const DRAFT_BLOCK = 16;
-
 /** What of the cameras and the view the passes must know, the camera that counts most first. */
 interface Seen {
-  readonly count: number;
   readonly layers: Int32Array;
   readonly shifts: Float32Array;
   readonly weights: Float32Array;
@@ -70,13 +65,14 @@ export class ViewRenderer {
   readonly #originalTexture: Texture;
   readonly #header: Header;
   readonly #cameras: CameraTextures;
-  readonly #fineBounds: Bounds;
-  readonly #draftBounds: Bounds;
+  readonly #bounds: Bounds;
+  /** See `search.glsl`. */
+  readonly #near: Texture;
+  readonly #far: Texture;
   readonly #view: Program;
-  readonly #geometry: Program;
-  readonly #draft: Program;
-  readonly #surface: Texture;
-  readonly #geometryTarget: WebGLFramebuffer;
+  readonly #draft: Draft;
+  readonly #copy: Program;
+  readonly #draftTexture: Texture;
 
   /** Throws Error where there is no WebGL 2. */
   constructor(canvas: HTMLCanvasElement | OffscreenCanvas, header: Header) {
@@ -85,15 +81,14 @@ export class ViewRenderer {
     this.gl = gl as WebGL2RenderingContext;
     this.#header = header;
     this.#cameras = new CameraTextures(this.gl, header);
-    this.#fineBounds = new Bounds(this.gl, header, FINE_BLOCK, header.mapScale > 1 ? 1 : 0); // enlarging looks at the samples around
-    this.#draftBounds = new Bounds(this.gl, header, DRAFT_BLOCK, 0);
+    this.#bounds = new Bounds(header);
+    this.#near = new Texture(this.gl, 4, this.#bounds.across, this.#bounds.down);
+    this.#far = new Texture(this.gl, 4, this.#bounds.across, this.#bounds.down);
     this.#view = makeProgram(this.gl, fullVertex, searchShader + viewFragment);
-    const { width, height } = this.#cameras.chroma;
-    this.#surface = new Texture(this.gl, 4, width, height);
-    this.#geometryTarget = framebufferOf(this.gl, this.#surface);
     this.#originalTexture = new Texture(this.gl, 4, header.width, header.height);
-    this.#geometry = makeProgram(this.gl, fullVertex, searchShader + geometryFragment);
-    this.#draft = makeProgram(this.gl, fullVertex, draftFragment);
+    this.#draft = new Draft(header);
+    this.#copy = makeProgram(this.gl, fullVertex, copyFragment);
+    this.#draftTexture = new Texture(this.gl, 4, header.width, header.height);
   }
 
   /**
@@ -106,20 +101,9 @@ export class ViewRenderer {
     const seeing = contributors(this.#header, view, ({ row, col }) => frames.some((frame) => at(frame, row, col)));
     const own = seeing.find(({ camera }) => camera.row === view.row && camera.col === view.col);
     const used = own === undefined || settings.dolly !== 0 ? seeing.sort((a, b) => b.weight - a.weight) : [own];
-    const isDraft = !settings.fine && settings.look === "picture" && !settings.raw;
-    const layers = this.#cameras.place(used.map(({ camera }) => frames.find((frame) => at(frame, camera.row, camera.col))!), !isDraft);
-    const seen: Seen = {
-      count: used.length, layers: new Int32Array(SLOTS), shifts: new Float32Array(2 * SLOTS), weights: new Float32Array(SLOTS), dolly: settings.dolly,
-    };
-    seen.layers.set(layers);
-    used.forEach(({ shift, weight }, i) => {
-      seen.shifts.set(shift, 2 * i);
-      seen.weights[i] = weight;
-    });
-    const bounds = isDraft ? this.#draftBounds : this.#fineBounds;
-    bounds.draw(this.#cameras.maps, this.#cameras.version, seen.count, (program) => this.#describe(program, seen, 1, 0));
-    if (isDraft) this.#drawDraft(seen, settings, area, target);
-    else this.#drawView(seen, settings, area, target);
+    const cameras = used.map(({ camera, shift, weight }) => ({ frame: frames.find((one) => at(one, camera.row, camera.col))!, shift, weight }));
+    if (!settings.fine && settings.look === "picture" && !settings.raw) this.#drawDraft(cameras, settings, area, target);
+    else this.#drawView(cameras, settings, area, target);
   }
 
   /** Disparity of one pixel of a view, px, and whether any camera sees it. */
@@ -137,6 +121,17 @@ export class ViewRenderer {
     return { disparity: range[0] + share * (range[1] - range[0]), isSeen: data[2] === 0 };
   }
 
+  /** Draw the middle of a fine view, a share of its sides, where nobody sees it: to find out how long that takes. */
+  drawMiddle(frames: readonly CameraFrame[], view: Viewpoint, share: number): void {
+    const { width, height } = this.#header;
+    const texture = new Texture(this.gl, 4, Math.ceil(share * width), Math.ceil(share * height));
+    const target = framebufferOf(this.gl, texture);
+    const area = { x: (texture.width - width) >> 1, y: (texture.height - height) >> 1, width, height };
+    this.draw(frames, view, { look: "picture", fine: true, dolly: 0 }, area, target);
+    this.gl.deleteFramebuffer(target);
+    texture.delete();
+  }
+
   /** A view's pixels at picture size. */
   read(frames: readonly CameraFrame[], view: Viewpoint, settings: ViewSettings): Pixels {
     const { gl } = this;
@@ -152,51 +147,37 @@ export class ViewRenderer {
     return { width, height, data };
   }
 
-  /** Surfaces at one place of 2 x 2 pixels, or of 4 x 4 for a smaller picture, then each pixel's brightness. */
-  #drawDraft(seen: Seen, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
-    const { gl } = this;
-    const { luma, chroma, maps } = this.#cameras;
-    const { width, height, mapScale } = this.#header;
-    const step = area.width < width ? 4 : 2;
-    const first = (mapScale - 1) / 2; // the middle of a map's first sample
-    const [across, down] = [Math.ceil(width / step), Math.ceil(height / step)];
-    const geometry = this.#geometry;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#geometryTarget);
-    gl.viewport(0, 0, across, down);
-    geometry.use();
-    geometry.textures({ uMaps: maps, uChroma: chroma, uNear: this.#draftBounds.near, uFar: this.#draftBounds.far });
-    this.#describe(geometry, seen, 1 / step, first);
-    gl.uniform1f(geometry.at("uTile"), DRAFT_BLOCK / step);
-    gl.uniform2i(geometry.at("uSize"), across, down);
-    gl.uniform1i(geometry.at("uTwoSuffice"), 1);
-    gl.uniform1i(geometry.at("uMapStep"), step / mapScale);
-    gl.uniform1f(geometry.at("uChromaStep"), step / 2);
-    gl.uniform2i(geometry.at("uChromaSize"), chroma.width, chroma.height);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-
-    const draft = this.#draft;
-    draft.use();
-    draft.textures({ uSurface: this.#surface, uLuma: luma });
-    this.#describe(draft, seen, 1, 0);
-    gl.uniform2i(draft.at("uSize"), width, height);
-    gl.uniform1f(draft.at("uStep"), step);
-    gl.uniform1f(draft.at("uFirst"), first);
-    gl.uniform2i(draft.at("uSurfaceSize"), across, down);
-    gl.uniform2f(draft.at("uLumaTexel"), 1 / luma.width, 1 / luma.height);
-    this.#drawArea(draft, settings, area, target);
+  #drawDraft(cameras: readonly DraftCamera[], settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
+    const [width, height] = [Math.min(area.width, this.#header.width), Math.min(area.height, this.#header.height)];
+    this.#draftTexture.upload(this.#draft.make(cameras, settings.dolly, settings.offset ?? [0, 0], width, height), width, height);
+    const copy = this.#copy;
+    copy.use();
+    copy.textures({ uPicture: this.#draftTexture });
+    this.gl.uniform2i(copy.at("uSize"), width, height);
+    this.#drawArea(copy, settings, area, target);
   }
 
-  #drawView(seen: Seen, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
+  #drawView(cameras: readonly DraftCamera[], settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
+    const seen: Seen = {
+      layers: new Int32Array(SLOTS), shifts: new Float32Array(2 * SLOTS), weights: new Float32Array(SLOTS), dolly: settings.dolly,
+    };
+    seen.layers.set(this.#cameras.place(cameras.map(({ frame }) => frame)));
+    cameras.forEach(({ shift, weight }, i) => {
+      seen.shifts.set(shift, 2 * i);
+      seen.weights[i] = weight;
+    });
+    this.#bounds.update(cameras.map(({ frame, shift }) => ({ map: frame.map, shift })), settings.dolly);
+    this.#near.upload(this.#bounds.nears);
+    this.#far.upload(this.#bounds.fars);
     const { gl } = this;
     const view = this.#view;
     const look = settings.look === "difference" && this.original === undefined ? "picture" : settings.look;
-    if (look === "difference" && this.#uploaded !== this.original) this.#originalTexture.upload(this.original!);
+    if (look === "difference" && this.#uploaded !== this.original) this.#originalTexture.upload(this.original!.data);
     if (look === "difference") this.#uploaded = this.original;
     view.use();
-    view.textures({ uCameras: this.#cameras.pixels, uNear: this.#fineBounds.near, uFar: this.#fineBounds.far, uOriginal: this.#originalTexture });
-    this.#describe(view, seen, 1, 0);
-    gl.uniform1f(view.at("uTile"), FINE_BLOCK);
-    gl.uniform1i(view.at("uTwoSuffice"), 0);
+    view.textures({ uCameras: this.#cameras.pixels, uNear: this.#near, uFar: this.#far, uOriginal: this.#originalTexture });
+    this.#describe(view, seen);
+    gl.uniform1f(view.at("uTile"), BLOCK);
     gl.uniform2i(view.at("uSize"), this.#header.width, this.#header.height);
     gl.uniform1f(view.at("uWipe"), settings.wipe ?? 0);
     gl.uniform1i(view.at("uLook"), settings.raw ? RAW : LOOKS.indexOf(look));
@@ -226,15 +207,16 @@ export class ViewRenderer {
     gl.colorMask(true, true, true, true);
   }
 
-  /** What all passes must know of the cameras and the view; `scale`: samples of the pass across a px, the first one at `first` px. */
-  #describe(program: Program, { layers, shifts, weights, dolly }: Seen, scale: number, first: number): void {
+  /** What the shader must know of the cameras and the view. */
+  #describe(program: Program, { layers, shifts, weights, dolly }: Seen): void {
     const { gl } = this;
     const { width, height, range } = this.#header;
     gl.uniform4iv(program.at("uLayer"), layers);
-    gl.uniform2fv(program.at("uShift"), shifts.map((shift) => scale * shift));
+    gl.uniform4f(program.at("uShiftX"), shifts[0], shifts[2], shifts[4], shifts[6]);
+    gl.uniform4f(program.at("uShiftY"), shifts[1], shifts[3], shifts[5], shifts[7]);
     gl.uniform4fv(program.at("uWeight"), weights);
     gl.uniform2f(program.at("uRange"), ...range);
-    gl.uniform3f(program.at("uDolly"), dolly, scale * ((width - 1) / 2 - first), scale * ((height - 1) / 2 - first));
+    gl.uniform3f(program.at("uDolly"), dolly, (width - 1) / 2, (height - 1) / 2);
     gl.uniform1f(program.at("uInfinity"), infinityOf(this.#header));
   }
 }

@@ -1,5 +1,6 @@
 #version 300 es
 // What the shaders of views share: where cameras see a point, and which surface a view has there. They define `codeAt`.
+// No uniform is indexed by a variable, nor in a function by what is handed to it: GPUs in software take long for that.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -8,9 +9,9 @@ precision highp sampler2DArray;
 uniform sampler2D uNear;         // per tile, in each camera's channel: the largest code value; 0: none
 uniform sampler2D uFar;          // likewise 1 - the smallest
 uniform float uTile;             // samples across a tile
-uniform vec2 uShift[4];          // samples from the view to the camera for each px of disparity
+uniform vec4 uShiftX;            // samples from the view to each camera for each px of disparity
+uniform vec4 uShiftY;
 uniform vec4 uWeight;            // of the cameras, falling; 0: this one does not count
-uniform bool uTwoSuffice;        // the others are not asked where the two cameras that count most agree
 uniform ivec4 uLayer;            // of each camera in the array textures
 uniform vec2 uRange;             // px that the code values 0 and 1 mean
 uniform vec3 uDolly;             // how far ahead of the cameras' plane the view stands, 1 / px; the place it moves to
@@ -23,8 +24,8 @@ const float TOLERANCE = 1.5;    // px within which disparities are one surface
 const float RATIO = 1.3;        // by which farther cameras must outweigh nearer ones
 const int MOST_STEPS = 256;
 
-// Code value of a camera's sample.
-float codeAt(int camera, ivec2 pixel);
+// Code value of a sample of a layer.
+float codeAt(int layer, ivec2 pixel);
 
 float px(float code) {
     return mix(uRange.x, uRange.y, code);
@@ -34,24 +35,28 @@ bool isInside(ivec2 pixel) {
     return all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, uSize));
 }
 
-// Where a camera sees the view's point `at` at disparity d.
-vec2 placeOf(int camera, vec2 at, float d) {
-    return at + uShift[camera] * d - uDolly.x * (d - uInfinity) * (at - uDolly.yz);
+// A camera sees the view's point `at` at disparity d where `base + slope * d` is.
+vec2 baseOf(vec2 at) {
+    return at + uDolly.x * uInfinity * (at - uDolly.yz);
 }
 
-// Disparity of a camera's pixel where it is seen at `at` in the view, else UNKNOWN; `surface`: what the pixel has.
-float seenThere(int camera, vec2 at, float d, out float surface) {
-    ivec2 pixel = ivec2(floor(placeOf(camera, at, d) + 0.5));
+vec2 slopeOf(vec2 shift, vec2 at) {
+    return shift - uDolly.x * (at - uDolly.yz);
+}
+
+// Disparity of a camera's pixel where it is seen there in the view, else UNKNOWN; `surface`: what the pixel has.
+float seenThere(int layer, vec2 base, vec2 slope, float d, out float surface) {
+    ivec2 pixel = ivec2(floor(base + slope * d + 0.5));
     surface = d;
     if (!isInside(pixel)) return UNKNOWN;
-    surface = px(codeAt(camera, pixel));
-    vec2 miss = abs(placeOf(camera, at, surface) - vec2(pixel));
+    surface = px(codeAt(layer, pixel));
+    vec2 miss = abs(base + slope * surface - vec2(pixel));
     return max(miss.x, miss.y) <= REACH ? surface : UNKNOWN;
 }
 
 // The nearest surface that a camera has at a place of the view, between two bounds, near to far.
-float search(int camera, vec2 at, float near, float far) {
-    vec2 way = abs(placeOf(camera, at, near) - placeOf(camera, at, far));
+float search(int layer, vec2 base, vec2 slope, float near, float far) {
+    vec2 way = abs(slope * (near - far));
     float travel = max(way.x, way.y);
     bool isOne = travel <= 1.0;
     int steps = isOne ? 0 : min(int(ceil(travel)), MOST_STEPS);
@@ -60,7 +65,7 @@ float search(int camera, vec2 at, float near, float far) {
     bool isOwn = false;
     for (int k = 0; k <= steps;) {
         float surface;
-        float found = seenThere(camera, at, d, surface);
+        float found = seenThere(layer, base, slope, d, surface);
         if (found > UNKNOWN) return found;
         // Between two steps both axes may round differently: the surface's own place decides.
         isOwn = !isOwn && abs(d - surface) < stride;
@@ -99,13 +104,11 @@ float surfaceAt(vec2 at, out vec4 found, out float background, out bool isEdge) 
     vec4 nears = mix(uRange.xxxx, uRange.yyyy, near);
     vec4 fars = mix(uRange.xxxx, uRange.yyyy, far);
     vec4 isThere = vec4(greaterThan(near, vec4(0.0)));
-    if (near.x > 0.0) found.x = search(0, at, nears.x, fars.x);
-    if (near.y > 0.0) found.y = search(1, at, nears.y, fars.y);
-    int rest = uTwoSuffice && found.y != UNKNOWN && abs(found.x - found.y) <= TOLERANCE ? 0 : 1;
-    for (int once = 0; once < rest; once++) {
-        if (near.z > 0.0) found.z = search(2, at, nears.z, fars.z);
-        if (near.w > 0.0) found.w = search(3, at, nears.w, fars.w);
-    }
+    vec2 base = baseOf(at);
+    if (near.x > 0.0) found.x = search(uLayer.x, base, slopeOf(vec2(uShiftX.x, uShiftY.x), at), nears.x, fars.x);
+    if (near.y > 0.0) found.y = search(uLayer.y, base, slopeOf(vec2(uShiftX.y, uShiftY.y), at), nears.y, fars.y);
+    if (near.z > 0.0) found.z = search(uLayer.z, base, slopeOf(vec2(uShiftX.z, uShiftY.z), at), nears.z, fars.z);
+    if (near.w > 0.0) found.w = search(uLayer.w, base, slopeOf(vec2(uShiftX.w, uShiftY.w), at), nears.w, fars.w);
     vec4 far4 = mix(uRange.yyyy, fars, isThere);
     vec4 near4 = mix(uRange.xxxx, nears, isThere);
     background = min(min(far4.x, far4.y), min(far4.z, far4.w));
@@ -113,6 +116,11 @@ float surfaceAt(vec2 at, out vec4 found, out float background, out bool isEdge) 
     background = min(background, foreground);
     isEdge = foreground - background > TOLERANCE;
     return vote(found);
+}
+
+// Shift (x, y), layer and weight of the camera that a vector has its 1 for.
+vec4 cameraOf(vec4 is) {
+    return vec4(dot(is, uShiftX), dot(is, uShiftY), dot(is, vec4(uLayer)), dot(is, uWeight));
 }
 
 vec3 rgb(vec3 yuv) {

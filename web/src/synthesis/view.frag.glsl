@@ -28,8 +28,8 @@ const int DISAGREEMENT = 4;
 const int DIFFERENCE = 5;
 const int RAW = 6;              // disparity in 16 bits, for programs
 
-float codeAt(int camera, ivec2 pixel) {
-    return texelFetch(uCameras, ivec3(pixel, uLayer[camera]), 0).a;
+float codeAt(int layer, ivec2 pixel) {
+    return texelFetch(uCameras, ivec3(pixel, layer), 0).a;
 }
 
 float surfaceAt(vec2 at) {
@@ -47,12 +47,12 @@ vec4 cubicWeights(float t) {
     return vec4(a * t * s * s, inner, after, a * s * t * t);
 }
 
-vec4 linear(vec2 at, int camera) {
-    return texture(uCameras, vec3((at + 0.5) / vec2(uSize), uLayer[camera]));
+vec4 linear(vec2 at, int layer) {
+    return texture(uCameras, vec3((at + 0.5) / vec2(uSize), layer));
 }
 
 // Cubic convolution in nine linear fetches: the two inner weights have one sign.
-vec4 cubic(vec2 at, int camera) {
+vec4 cubic(vec2 at, int layer) {
     vec2 base = floor(at);
     vec4 x = cubicWeights(at.x - base.x);
     vec4 y = cubicWeights(at.y - base.y);
@@ -63,19 +63,19 @@ vec4 cubic(vec2 at, int camera) {
     vec3 atY = base.y + vec3(places.x, y.z / weightY.y, places.z);
     vec4 sum = vec4(0.0);
     for (int j = 0; j < 3; j++) {
-        for (int i = 0; i < 3; i++) sum += weightX[i] * weightY[j] * linear(vec2(atX[i], atY[j]), camera);
+        for (int i = 0; i < 3; i++) sum += weightX[i] * weightY[j] * linear(vec2(atX[i], atY[j]), layer);
     }
     return sum;
 }
 
 // Of the four pixels around a place those on a surface; w: their share.
-vec4 beside(vec2 at, int camera, float d) {
+vec4 beside(vec2 at, int layer, float d) {
     ivec2 base = ivec2(floor(at));
     vec2 part = at - vec2(base);
     vec4 sum = vec4(0.0);
     for (int k = 0; k < 4; k++) {
         ivec2 offset = ivec2(k & 1, k >> 1);
-        vec4 pixel = texelFetch(uCameras, ivec3(min(base + offset, uSize - 1), uLayer[camera]), 0);
+        vec4 pixel = texelFetch(uCameras, ivec3(min(base + offset, uSize - 1), layer), 0);
         vec2 share = mix(1.0 - part, part, vec2(offset));
         float weight = abs(px(pixel.a) - d) <= TOLERANCE ? share.x * share.y : 0.0;
         sum += weight * vec4(pixel.rgb, 1.0);
@@ -83,21 +83,20 @@ vec4 beside(vec2 at, int camera, float d) {
     return sum.w > 1e-3 ? vec4(sum.rgb / sum.w, sum.w) : vec4(0.0);
 }
 
-// What a camera shows of the view's point `at` at disparity d, and how much that counts; w = 0: it does not see it.
-vec4 fetch(int camera, vec2 at, float d) {
-    vec2 place = placeOf(camera, at, d);
+// What a camera shows at a place that is the view's at disparity d, and how much that counts; w = 0: it does not see it.
+vec4 fetch(int layer, vec2 place, float d) {
     if (any(lessThanEqual(place, vec2(-0.5))) || any(greaterThanEqual(place, vec2(uSize) - 0.5))) return vec4(0.0);
     place = clamp(place, vec2(0.0), vec2(uSize - 1));
-    vec4 pixel = linear(place, camera);
+    vec4 pixel = linear(place, layer);
     if (abs(px(pixel.a) - d) <= TOLERANCE) {
         if (uFine) {
-            vec4 sharp = cubic(place, camera);
+            vec4 sharp = cubic(place, layer);
             // The cubic mean of the map differs where its footprint holds another surface.
             if (abs(px(sharp.a) - d) <= TOLERANCE) pixel = sharp;
         }
         return vec4(pixel.rgb, 1.0);
     }
-    vec4 edge = beside(place, camera, d);
+    vec4 edge = beside(place, layer, d);
     return vec4(edge.rgb, 0.5 * edge.w);
 }
 
@@ -128,10 +127,11 @@ vec4 blend(vec2 at, float d, out int seen, out float squares) {
     squares = 0.0;
     seen = 0;
     for (int i = 0; i < 4; i++) {
-        if (uWeight[i] == 0.0) continue;
-        vec4 pixel = fetch(i, at, d);
+        vec4 camera = cameraOf(vec4(equal(ivec4(i), ivec4(0, 1, 2, 3))));
+        if (camera.w == 0.0) continue;
+        vec4 pixel = fetch(int(camera.z + 0.5), baseOf(at) + slopeOf(camera.xy, at) * d, d);
         if (pixel.w == 0.0) continue;
-        float weight = pixel.w * uWeight[i];
+        float weight = pixel.w * camera.w;
         sum += weight * vec4(pixel.rgb, 1.0);
         squares += weight * pixel.r * pixel.r;
         seen++;

@@ -1,0 +1,311 @@
+/** Drafts of views, for pictures that move: made by the processor, since they are for those whose GPU is slow, or none. */
+
+import type { Header } from "../container/header.ts";
+import { infinityOf } from "../geometry.ts";
+import type { CameraFrame } from "./camera_textures.ts";
+
+/** Cameras that are asked. */
+const MOST_CAMERAS = 4;
+/** Samples around its place that a moved one covers. */
+const REACH = 0.54;
+/** px within which disparities are one surface, and by how much farther cameras must outweigh nearer ones; as in `search.glsl`. */
+const TOLERANCE = 1.5;
+const RATIO = 1.3;
+/** px, each way, that share a disparity and colour differences: of a whole picture, and of a smaller one. */
+const STEP = 2;
+const SMALLER_STEP = 4;
+
+/** A camera that a draft is made from, as the view sees it: px (x, y) from the view to it for each px of disparity. */
+export interface DraftCamera {
+  readonly frame: CameraFrame;
+  readonly shift: readonly [number, number];
+  readonly weight: number;
+}
+
+/** Numbers below 0 and above 255 -> 0..255. */
+const CLAMP_FROM = 512;
+const CLAMPED = Uint8Array.from({ length: 3 * CLAMP_FROM }, (_, i) => Math.min(Math.max(i - CLAMP_FROM, 0), 255));
+
+/** What 1 is in whole numbers, and black of a limited range, which is rounded by it too. */
+const BITS = 16;
+const ONE = 1 << BITS;
+const BLACK = Math.round(ONE * (CLAMP_FROM + 0.5 - 16 * (255 / 219)));
+
+export class Draft {
+  readonly #header: Header;
+  readonly #pixels: Uint32Array;
+  /** By code value: disparity, and how much it is enlarged ahead of the cameras' plane. */
+  readonly #px = new Float32Array(256);
+  readonly #scale = new Float32Array(256);
+  /** Code values within which disparities are one surface. */
+  readonly #tolerance: number;
+  readonly #found: Uint8Array[];
+  readonly #surface: Float32Array;
+  /** Places of the two cameras that show a sample, by their order: i + 4 j. */
+  readonly #seen: Uint8Array;
+  /** What a sample's colour differences add to red, green and blue. */
+  readonly #tint: Int16Array;
+  #step = STEP;
+  #across = 0;
+  #down = 0;
+
+  constructor(header: Header) {
+    const { width, height, range } = header;
+    this.#header = header;
+    this.#pixels = new Uint32Array(width * height);
+    this.#tolerance = (TOLERANCE * 255) / (range[1] - range[0]);
+    const samples = Math.ceil(width / STEP) * Math.ceil(height / STEP);
+    this.#found = Array.from({ length: MOST_CAMERAS }, () => new Uint8Array(samples));
+    this.#surface = new Float32Array(samples);
+    this.#seen = new Uint8Array(samples);
+    this.#tint = new Int16Array(3 * samples);
+  }
+
+  /**
+   * A view from so far ahead (see `ViewSettings.dolly`), of `width` x `height`, moved by `offset` px: RGBA, rows from the top.
+   *
+   * The camera that counts most comes first. What is returned holds until the next call.
+   */
+  make(cameras: readonly DraftCamera[], dolly: number, offset: readonly [number, number], width: number, height: number): Uint8Array {
+    this.#step = width < this.#header.width ? SMALLER_STEP : STEP;
+    this.#across = Math.ceil(this.#header.width / this.#step);
+    this.#down = Math.ceil(this.#header.height / this.#step);
+    this.#prepare(dolly);
+    cameras.forEach((camera, i) => this.#move(camera, this.#found[i]));
+    this.#vote(cameras.map(({ weight }) => weight));
+    this.#fillHoles();
+    this.#colour(cameras, dolly);
+    this.#paint(cameras, dolly, offset, width, height);
+    return new Uint8Array(this.#pixels.buffer, 0, 4 * width * height);
+  }
+
+  #prepare(dolly: number): void {
+    const { range } = this.#header;
+    const infinity = infinityOf(this.#header);
+    for (let code = 0; code < 256; code++) {
+      this.#px[code] = range[0] + (code / 255) * (range[1] - range[0]);
+      this.#scale[code] = 1 / (1 - dolly * (this.#px[code] - infinity));
+    }
+  }
+
+  /** px of the first sample's middle. */
+  get #first(): number {
+    return (this.#header.mapScale - 1) / 2;
+  }
+
+  /** The nearest surface that a camera has at each sample of the view; 0: none. */
+  #move({ frame: { map }, shift }: DraftCamera, found: Uint8Array): void {
+    const { width, height, mapScale } = this.#header;
+    const [step, across, down, px, scale] = [this.#step, this.#across, this.#down, this.#px, this.#scale];
+    const columns = Math.ceil(width / mapScale);
+    const stride = step / mapScale;
+    const [middleX, middleY] = [((width - 1) / 2 - this.#first) / step, ((height - 1) / 2 - this.#first) / step];
+    const [shiftX, shiftY] = [shift[0] / step, shift[1] / step];
+    found.fill(0, 0, across * down);
+    for (let j = 0; j < down; j++) {
+      const row = j * stride * columns;
+      for (let i = 0; i < across; i++) {
+        const code = Math.max(map[row + i * stride], 1);
+        const d = px[code];
+        const larger = scale[code];
+        const x = (i - shiftX * d - middleX) * larger + middleX;
+        const y = (j - shiftY * d - middleY) * larger + middleY;
+        const left = Math.max(Math.ceil(x - REACH), 0);
+        const right = Math.min(Math.floor(x + REACH), across - 1);
+        const bottom = Math.min(Math.floor(y + REACH), down - 1);
+        for (let v = Math.max(Math.ceil(y - REACH), 0); v <= bottom; v++) {
+          for (let u = left; u <= right; u++) {
+            if (found[v * across + u] < code) found[v * across + u] = code;
+          }
+        }
+      }
+    }
+  }
+
+  /** Surfaces are tried near to far; a farther one wins where its cameras weigh RATIO times the winner so far. */
+  #vote(weights: readonly number[]): void {
+    const [tolerance, surface, seen] = [this.#tolerance, this.#surface, this.#seen];
+    const count = weights.length;
+    const codes = new Uint8Array(count);
+    for (let at = this.#across * this.#down - 1; at >= 0; at--) {
+      for (let i = 0; i < count; i++) codes[i] = this.#found[i][at];
+      let best = -1;
+      let strength = 0;
+      let below = 256;
+      for (;;) {
+        let nearest = 0;
+        for (let i = 0; i < count; i++) if (codes[i] < below && codes[i] > nearest) nearest = codes[i];
+        if (nearest === 0) break;
+        let total = 0;
+        let sum = 0;
+        let least = nearest;
+        for (let i = 0; i < count; i++) {
+          if (codes[i] >= below || codes[i] < nearest - tolerance || codes[i] === 0) continue;
+          total += weights[i];
+          sum += weights[i] * codes[i];
+          if (codes[i] < least) least = codes[i];
+        }
+        if (best < 0 || total > RATIO * strength) {
+          best = sum / total;
+          strength = total;
+        }
+        below = least;
+      }
+      surface[at] = best;
+      // The two that count most are enough; of what no camera sees, all know as much.
+      let one = -1;
+      let other = -1;
+      for (let i = 0; i < count && other < 0; i++) {
+        if (best >= 0 && (codes[i] === 0 || Math.abs(codes[i] - best) > tolerance)) continue;
+        if (one < 0) one = i;
+        else other = i;
+      }
+      seen[at] = one < 0 ? 0 : one + 4 * (other < 0 ? one : other);
+    }
+  }
+
+  /** What no camera knows is like the farther end of its gap in the row. */
+  #fillHoles(): void {
+    const surface = this.#surface;
+    for (let j = 0; j < this.#down; j++) {
+      const end = (j + 1) * this.#across;
+      let before = -1;
+      for (let at = end - this.#across; at < end; at++) {
+        if (surface[at] >= 0) {
+          before = surface[at];
+          continue;
+        }
+        let next = at;
+        while (next < end && surface[next] < 0) next++;
+        const after = next < end ? surface[next] : before;
+        surface.fill(before < 0 ? Math.max(after, 0) : Math.min(before, after), at, next);
+        at = next - 1;
+      }
+    }
+  }
+
+  /** Colour differences of each sample, from the cameras that show it. */
+  #colour(cameras: readonly DraftCamera[], dolly: number): void {
+    const { width, height, range } = this.#header;
+    const infinity = infinityOf(this.#header);
+    const [step, across, surface, tint] = [this.#step, this.#across, this.#surface, this.#tint];
+    const [columns, rows] = [(width + 1) >> 1, (height + 1) >> 1];
+    const toPx = (range[1] - range[0]) / 255;
+    const [middleX, middleY] = [(width - 1) / 2, (height - 1) / 2];
+    for (let j = 0, at = 0; j < this.#down; j++) {
+      const y = this.#first + j * step;
+      for (let i = 0; i < across; i++, at++) {
+        const x = this.#first + i * step;
+        const d = range[0] + toPx * surface[at];
+        const ahead = dolly * (d - infinity);
+        const fromX = x - ahead * (x - middleX);
+        const fromY = y - ahead * (y - middleY);
+        let cb = 0;
+        let cr = 0;
+        let total = 0;
+        const pair = this.#seen[at];
+        for (let k = 0; k < 2; k++) {
+          const { frame: { picture }, shift, weight } = cameras[k === 0 ? pair & 3 : pair >> 2];
+          const u = Math.min(Math.max(Math.round((fromX + shift[0] * d) / 2), 0), columns - 1);
+          const v = Math.min(Math.max(Math.round((fromY + shift[1] * d - 0.5) / 2), 0), rows - 1);
+          cb += weight * picture.u[v * columns + u];
+          cr += weight * picture.v[v * columns + u];
+          total += weight;
+        }
+        cb = (cb / total - 128) * (255 / 224);
+        cr = (cr / total - 128) * (255 / 224);
+        tint[3 * at] = 1.5748 * cr;
+        tint[3 * at + 1] = -0.18732 * cb - 0.46812 * cr;
+        tint[3 * at + 2] = 1.8556 * cb;
+      }
+    }
+  }
+
+  /** Brightness of each pixel, from the two cameras that show its sample: between their pixels for a whole picture, else of the nearest ones. */
+  #paint(cameras: readonly DraftCamera[], dolly: number, offset: readonly [number, number], width: number, height: number): void {
+    const whole = this.#header;
+    const infinity = infinityOf(whole);
+    const [step, surface, seen, tint, pixels] = [this.#step, this.#surface, this.#seen, this.#tint, this.#pixels];
+    const toPx = (whole.range[1] - whole.range[0]) / 255;
+    const [middleX, middleY] = [(whole.width - 1) / 2, (whole.height - 1) / 2];
+    const stride = 2 * ((whole.width + 1) >> 1);
+    const isWhole = width === whole.width;
+    // A run of pixels of one sample is read from where its first one lies.
+    const [lastX, lastY] = [whole.width - (isWhole ? STEP + 0.001 : SMALLER_STEP), whole.height - 1.001];
+    const sampleOf = (at: number, count: number) => Math.min(Math.max(Math.floor((at - this.#first) / step + 0.5), 0), count - 1);
+    const placeOf = (i: number, from: number, to: number, by: number) => ((i + 0.5) * to) / from - 0.5 + by;
+    const placesX = Float32Array.from({ length: width }, (_, i) => placeOf(i, width, whole.width, offset[0]));
+    const samplesX = Uint16Array.from(placesX, (x) => sampleOf(x, this.#across));
+    const one = new Fetch();
+    const other = new Fetch();
+    for (let j = 0, at = 0; j < height; j++) {
+      const y = placeOf(j, height, whole.height, offset[1]);
+      const row = sampleOf(y, this.#down) * this.#across;
+      for (let i = 0; i < width; ) {
+        const begin = i;
+        const column = samplesX[i];
+        const sample = row + column;
+        while (i < width && samplesX[i] === column) i++;
+        const x = placesX[begin];
+        const d = whole.range[0] + toPx * surface[sample];
+        const ahead = dolly * (d - infinity);
+        const fromX = x - ahead * (x - middleX);
+        const fromY = y - ahead * (y - middleY);
+        const a = cameras[seen[sample] & 3];
+        const b = cameras[seen[sample] >> 2];
+        const gain = (ONE * (255 / 219)) / (a.weight + b.weight);
+        one.aim(fromX + a.shift[0] * d, fromY + a.shift[1] * d, lastX, lastY, stride, gain * a.weight);
+        other.aim(fromX + b.shift[0] * d, fromY + b.shift[1] * d, lastX, lastY, stride, gain * b.weight);
+        const first = a.frame.picture.y;
+        const second = b.frame.picture.y;
+        const red = tint[3 * sample];
+        const green = tint[3 * sample + 1];
+        const blue = tint[3 * sample + 2];
+        for (let k = begin; k < i; k++, at++) {
+          let sum: number;
+          if (isWhole) {
+            const p = one.place + k - begin;
+            const q = other.place + k - begin;
+            sum = first[p] * one.a + first[p + 1] * one.b + first[p + stride] * one.c + first[p + stride + 1] * one.d
+              + second[q] * other.a + second[q + 1] * other.b + second[q + stride] * other.c + second[q + stride + 1] * other.d;
+          } else {
+            const away = placesX[k] - x;
+            sum = first[(one.nearest + away) | 0] * one.all + second[(other.nearest + away) | 0] * other.all;
+          }
+          const grey = (sum + BLACK) >> BITS;
+          pixels[at] = 0xff000000 | (CLAMPED[grey + blue] << 16) | (CLAMPED[grey + green] << 8) | CLAMPED[grey + red];
+        }
+      }
+    }
+  }
+}
+
+/** Where one camera's brightness is read for a run of pixels of one sample, and how much its pixels count, in whole numbers. */
+class Fetch {
+  /** Of its four pixels the upper left one, and what each counts. */
+  place = 0;
+  a = 0;
+  b = 0;
+  c = 0;
+  d = 0;
+  /** The nearest pixel, between pixels of its row; and what it counts where it is alone. */
+  nearest = 0;
+  all = 0;
+
+  /** `u`, `v`: where the first pixel is seen; `gain`: what all four count together. */
+  aim(u: number, v: number, lastX: number, lastY: number, stride: number, gain: number): void {
+    const inX = Math.max(Math.min(u, lastX), 0);
+    const inY = Math.max(Math.min(v, lastY), 0);
+    const left = inX | 0;
+    const top = inY | 0;
+    const across = inX - left;
+    const down = inY - top;
+    this.place = top * stride + left;
+    this.all = gain | 0;
+    this.d = (gain * across * down) | 0;
+    this.c = ((gain * down) | 0) - this.d;
+    this.b = ((gain * across) | 0) - this.d;
+    this.a = this.all - this.b - this.c - this.d;
+    this.nearest = ((inY + 0.5) | 0) * stride + inX + 0.5;
+  }
+}
