@@ -21,7 +21,7 @@ from mvcodec.cluster.frame_segments import cut
 from mvcodec.cluster.places import Place
 from mvcodec.errors import InputError, SettingError
 
-pytestmark = pytest.mark.xdist_group("cluster")
+pytest_plugins = ("ctrl_c",)
 
 QUICK = ("--preset", "veryfast", "--matcher", "sgbm", "--qp", "30")
 FRAMES = 40
@@ -73,6 +73,7 @@ def test_segments_give_the_file_of_one_process_though_a_worker_is_killed(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("heeding_ctrl_c")
 def test_ctrl_c_leaves_finished_segments_and_the_next_run_uses_them(
     cluster: str, array: Path, whole: bytes, tmp_path: Path
 ) -> None:

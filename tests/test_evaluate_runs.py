@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,18 +16,12 @@ from small_arrays import write_array
 from mvcodec.cli.main import main
 from mvcodec.container import read_info
 
+pytest_plugins = ("ctrl_c",)
+
 
 @pytest.fixture(scope="module")
 def array(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_array(tmp_path_factory.mktemp("arrays") / "small", 2, 3, frames=2)
-
-
-@pytest.fixture
-def heeding_ctrl_c() -> Iterator[None]:
-    """Let commands started here heed SIGINT: a shell's background jobs, as tests may be, inherit none."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.usefixtures("heeding_ctrl_c")
