@@ -13,7 +13,7 @@ test("pictures that come too slowly get less detail, down to a limit", () => {
   draw(tempo, 8, 60);
   assert.equal(tempo.detail, 0.75);
   draw(tempo, 1000, 60);
-  assert.equal(tempo.detail, 0.25);
+  assert.equal(tempo.detail, 0.375);
 });
 
 test("where they come soon enough, more is tried, and less often each time that it was too much", () => {

@@ -14,7 +14,8 @@ const NEWEST = 0.25;
 const FALL_AFTER = 6;
 const RISE_AFTER = 60;
 const MOST_PATIENCE = 16 * RISE_AFTER;
-const DETAILS = [1, 0.75, 0.5, 0.375, 0.25] as const;
+/** Smaller ones would hardly be made sooner: what the browser does with any picture takes longer. */
+const DETAILS = [1, 0.75, 0.5, 0.375] as const;
 
 export class Tempo {
   #level = 0;
