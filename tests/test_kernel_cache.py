@@ -98,3 +98,13 @@ def test_nothing_else_of_numba_is_moved() -> None:
     def other() -> None: ...
 
     assert KernelCode.from_function(other, __file__) is None  # type: ignore[arg-type]
+
+
+def test_kernels_load_without_scipy_and_other_programs_still_find_its_blas() -> None:
+    program = (
+        "import sys\nimport mvcodec.kernels\nprint('scipy.linalg' in sys.modules)\n"
+        "from numba.np import arraymath, linalg\nprint(arraymath._HAVE_BLAS)\n"
+        "linalg.ensure_blas()\nprint('scipy.linalg' in sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "True", "True"]

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageOps
 
+from mvcodec.capture.bit_depth import BitDepth
 from mvcodec.capture.orientation import exif_orientation, matrix_orientation
+from mvcodec.capture.still_pictures import opened_still, still_facts, still_to_rgb
 from mvcodec.frames import Picture
 
 PICTURE: Picture = np.arange(2 * 3 * 3, dtype=np.uint8).reshape(2, 3, 3)
@@ -37,6 +39,41 @@ def test_exif_orientation_is_what_pillow_makes_of_it(value: int) -> None:
     orientation = exif_orientation(value)
     np.testing.assert_array_equal(orientation.apply(PICTURE), expected)
     assert orientation.size(3, 2) == expected.shape[1::-1]
+
+
+def chunks_of(png: bytes) -> list[bytes]:
+    """The chunks of a PNG."""
+    at, found = 8, []
+    while at < len(png):
+        end = at + 12 + struct.unpack_from(">I", png, at)[0]
+        found.append(png[at:end])
+        at = end
+    return found
+
+
+@pytest.mark.parametrize("behind", [False, True])
+def test_tags_behind_the_pixels_of_a_png_count_as_well(behind: bool) -> None:
+    image, target = Image.fromarray(PICTURE), io.BytesIO()
+    exif = image.getexif()
+    exif[0x112] = 6
+    image.save(target, "PNG", exif=exif)
+    chunks = chunks_of(target.getvalue())
+    tags = [chunk for chunk in chunks if chunk[4:8] == b"eXIf"]
+    others = [chunk for chunk in chunks if chunk not in tags]
+    ordered = [*others[:-1], *tags, others[-1]] if behind else chunks
+    with opened_still(target.getvalue()[:8] + b"".join(ordered)) as picture:
+        assert still_facts(picture).size == (2, 3)
+        np.testing.assert_array_equal(
+            still_to_rgb(picture, b"", BitDepth("x")), exif_orientation(6).apply(PICTURE)
+        )
+
+
+def test_facts_of_a_png_without_tags_need_no_pixels() -> None:
+    target = io.BytesIO()
+    Image.fromarray(PICTURE).save(target, "PNG")
+    with opened_still(target.getvalue()) as picture:
+        assert still_facts(picture).size == (3, 2)
+        assert picture.tile  # still waiting to be read
 
 
 @pytest.mark.parametrize("quarter", QUARTERS)

@@ -33,6 +33,9 @@ _BITS, _STRETCHED = "bits in the file", "stretched when read"
 
 _ALPHA_MODES = frozenset({"RGBA", "LA", "PA", "La", "RGBa"})
 _SIGNIFICANT_BITS = b"sBIT"
+_PNG = b"\x89PNG\r\n\x1a\n"
+_TAGS = frozenset({b"eXIf", b"tEXt", b"zTXt", b"iTXt"})
+"""Chunks of a PNG that may say how it is turned."""
 
 
 class UnreadablePicture(Exception):
@@ -84,11 +87,42 @@ def opened_still(source: Path | bytes) -> Iterator[ImageFile.ImageFile]:
 
 def still_facts(picture: ImageFile.ImageFile) -> StillFacts:
     """What the header of an opened picture says."""
-    tag = None if picture.format in _TURNED_WHEN_READ else picture.getexif().get(ExifTags.Base.Orientation)
-    orientation = exif_orientation(tag)
+    orientation = exif_orientation(_orientation_tag(picture))
     alpha = picture.mode in _ALPHA_MODES or "transparency" in picture.info
     count = getattr(picture, "n_frames", 1)
     return StillFacts(orientation.size(*picture.size), orientation, alpha, picture.info[_BITS], count)
+
+
+def _orientation_tag(picture: ImageFile.ImageFile) -> int | None:
+    """How a picture says that it must be turned, as EXIF counts; None where that needs no doing."""
+    if picture.format in _TURNED_WHEN_READ:
+        return None
+    # Pillow reads a PNG's pixels for what may stand behind them: mostly nothing does.
+    early = picture.format == "PNG" and picture.tile and not _has_late_tags(picture)
+    exif = Image.Image.getexif(picture) if early else picture.getexif()
+    tag: int | None = exif.get(ExifTags.Base.Orientation)
+    return tag
+
+
+def _has_late_tags(picture: ImageFile.ImageFile) -> bool:
+    """Whether a PNG that is not yet read, or a damaged one, has tags behind its pixels."""
+    file = picture.fp
+    assert file is not None
+    before = file.tell()
+    at, pixels = len(_PNG), False
+    try:
+        while True:
+            file.seek(at)
+            head = file.read(8)
+            if len(head) < 8:
+                return True
+            size, kind = struct.unpack(">I4s", head)
+            if kind == b"IEND" or (pixels and kind in _TAGS):
+                return kind in _TAGS
+            pixels |= kind == b"IDAT"
+            at += size + 12
+    finally:
+        file.seek(before)
 
 
 def is_see_through(picture: ImageFile.ImageFile) -> bool:

@@ -25,6 +25,9 @@ from mvcodec.layers.refinement import matcher_choices
 from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
 from mvcodec.stereo.given import given_range
 
+APART_S = 0.5
+"""Pictures nearer to each other in time tell the same of the range of disparities."""
+
 CODING = (
     "codec",
     "disparity_qp",
@@ -113,7 +116,9 @@ def find_range(
 
 
 def _samples(source: ArraySource, chosen: range) -> list[FrameSet]:
-    count = min(MAX_FRAMES, len(chosen))
+    """Frame sets spread over those chosen: few of a short time, in which scenes stay as they are."""
+    seconds = (len(chosen) - 1) / source.array.fps
+    count = min(MAX_FRAMES, len(chosen), 1 + round(seconds / APART_S))
     numbers = {chosen[index * (len(chosen) - 1) // max(count - 1, 1)] for index in range(count)}
     return [
         frame_set for number in sorted(numbers) for frame_set in source.frame_sets(slice(number, number + 1))

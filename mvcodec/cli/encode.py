@@ -29,6 +29,7 @@ from mvcodec.cli.encode_stream import (
 )
 from mvcodec.cli.info import document, simulcast_bits, summary
 from mvcodec.cli.interrupt import deferred_interrupt
+from mvcodec.cli.kernel_loading import load_kernels_beside
 from mvcodec.cli.layer_options import add_layer, layer_settings
 from mvcodec.cli.live_options import input_or_camera, is_live
 from mvcodec.cli.live_view_option import add_live_view, live_view
@@ -154,6 +155,7 @@ def _check_effect(arguments: argparse.Namespace) -> None:
 def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
     source: ArraySource = _open(arguments)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
+    load_kernels_beside()
     source = rectified_source(source, chosen, arguments)
     array = source.array
     if arguments.calibration is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import tempfile
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -92,6 +93,21 @@ def _is_writable(path: Path) -> bool:
     except OSError:
         return False
     return True
+
+
+def load_without_scipy() -> None:
+    """Load Numba's linear algebra, which no kernel needs, without SciPy, which takes a third of a second.
+
+    Numba asks whether SciPy is there as it loads, and again whenever something needs it: only the first is
+    left out, so that other programs' functions find it.
+    """
+    from numba.np import linalg
+
+    asks, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = asks
 
 
 def keep_compiled_code() -> None:
