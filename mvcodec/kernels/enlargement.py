@@ -23,7 +23,7 @@ def _between(upper, lower, up, line):  # type: ignore[no-untyped-def]
         line[2 * k + 1] = up * above + (1 - up) * below
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")  # a call would count the references of its arrays
 def _at_edge(small, picture, small_picture, y, x, dy, dx, agree, per_step, costs, values):  # type: ignore[no-untyped-def]
     """The disparity of one pixel by its colour; dy, dx: from it to sample (0, 0), in samples.
 

@@ -13,37 +13,55 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvcodec.kernels.view_fetch import BORDER, CONTOUR, add_edge, phase_of, place_of
+from mvcodec.kernels.view_fetch import BORDER, CONTOUR, corner_of, phase_of, place_of
 from mvcodec.kernels.view_marks import list_marked
-from mvcodec.kernels.view_vectors import add_fetched, store_colour
+from mvcodec.kernels.view_vectors import add_edge, add_fetched, store_colour
 
 FloatMap = NDArray[np.float32]
 ByteMap = NDArray[np.uint8]
 
 
-@njit(cache=True, nogil=True)
-def _see(x, y, d, cameras, planes, shifts, weights, tolerance, edge_trust, fetching, sums):  # type: ignore[no-untyped-def]
+# Inlined: a call would pass each array in eight parts, and count its references, for a few numbers of work.
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _see(x, y, d, shape, cameras, planes, shifts, weights, tolerance, edge_trust, fetching, sums):  # type: ignore[no-untyped-def]
     """Sum up what the cameras see of the view's point (x, y) at disparity d."""
-    luma, colour, disparities, fetchable = planes
-    _, height, width = disparities.shape
-    stride = width + 2 * BORDER
-    sums[:] = 0
+    luma, colour, depths, fetchable = planes
+    height, width = shape
+    stride, none = width + 2 * BORDER, np.uintp(0)
+    sums[0] = sums[1] = sums[2] = sums[3] = np.float32(0)
     for i in range(cameras.size):
         at_x, at_y, inside = place_of(x, y, d, shifts[i, 0], shifts[i, 1], width, height)
-        if not inside:
-            continue
-        left, top = np.int32(at_x), np.int32(at_y)
-        phase = np.uintp(phase_of(at_x - np.float32(left), at_y - np.float32(top)))
-        place = np.uintp((cameras[i] * (height + 2 * BORDER) + top + BORDER) * stride + left + BORDER)
-        here = fetchable[place]
-        if here == CONTOUR:
-            own, trusted = disparities[cameras[i]], weights[i] * edge_trust
-            add_edge(luma, colour, own, sums, np.uintp(0), place, left, top, phase, d, tolerance, trusted)
-        elif abs(here - d) <= tolerance:
-            add_fetched(luma, colour, fetching, sums, np.uintp(0), place, np.uintp(stride), phase, weights[i])
+        if inside:
+            left, top = np.int32(at_x), np.int32(at_y)
+            phase = np.uintp(phase_of(at_x - np.float32(left), at_y - np.float32(top)))
+            place = np.uintp((cameras[i] * (height + 2 * BORDER) + top + BORDER) * stride + left + BORDER)
+            here, below, weight = fetchable[place], np.uintp(stride), weights[i]
+            if here == CONTOUR:
+                corner, steps = corner_of(at_x, at_y, width, height)
+                corner += np.uintp(cameras[i] * height * width)
+                add_edge(
+                    luma,
+                    colour,
+                    depths,
+                    fetching,
+                    sums,
+                    none,
+                    place,
+                    below,
+                    corner,
+                    steps,
+                    phase,
+                    d,
+                    tolerance,
+                    weight * edge_trust,
+                )
+            elif abs(here - d) <= tolerance:
+                add_fetched(luma, colour, fetching, sums, none, place, below, phase, weight)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _surfaces(x, y, view_disparity, tolerance, surface, part):  # type: ignore[no-untyped-def]
     """Lists the surfaces of a pixel's 3 x 3 window, its own first, and their parts; how many."""
     height, width = view_disparity.shape
@@ -59,29 +77,43 @@ def _surfaces(x, y, view_disparity, tolerance, surface, part):  # type: ignore[n
                 surface[k], part[k] = d, np.float32(0)
                 count += 1
             if v != y or u != x:
-                part[k] += np.float32(1) / np.float32(1 + (u - x) * (u - x) + (v - y) * (v - y))
+                part[k] += np.float32(1 / 2) if v == y or u == x else np.float32(1 / 3)
     return count
 
 
 @njit(cache=True, nogil=True)
-def _add_surfaces(x, y, own, view_disparity, seeing, tolerance, others, surface, part):  # type: ignore[no-untyped-def]
-    """Turn a pixel's own sums into those of every surface of its 3 x 3 window.
-
-    `others`, `surface` and `part` are room for four, nine and nine numbers.
-    """
+def _add_surfaces(y, chosen, seen, view_disparity, seeing, tolerance, sums):  # type: ignore[no-untyped-def]
+    """Turn the own sums of the chosen pixels of row y into those of every surface of their 3 x 3 windows."""
     cameras, planes, shifts, weights, edge_trust, fetching = seeing
-    count = _surfaces(x, y, view_disparity, tolerance, surface, part)
-    scale = part[0] / own[3]
-    for value in range(3):
-        own[value] *= scale
-    own[3] = part[0]
-    for k in range(1, count):
-        _see(x, y, surface[k], cameras, planes, shifts, weights, tolerance, edge_trust, fetching, others)
-        if others[3] > 0:
-            scale = part[k] / others[3]
+    others, surface, part = np.empty(4, np.float32), np.empty(9, np.float32), np.empty(9, np.float32)
+    for x in chosen:
+        if seen[x] > 0:  # with its neighbours' colour alone it would spread that into holes beside it
+            count = _surfaces(x, y, view_disparity, tolerance, surface, part)
+            at = 4 * x
+            scale = part[0] / sums[at + 3]
             for value in range(3):
-                own[value] += scale * others[value]
-            own[3] += part[k]
+                sums[at + value] *= scale
+            sums[at + 3] = part[0]
+            for k in range(1, count):
+                _see(
+                    x,
+                    y,
+                    surface[k],
+                    view_disparity.shape,
+                    cameras,
+                    planes,
+                    shifts,
+                    weights,
+                    tolerance,
+                    edge_trust,
+                    fetching,
+                    others,
+                )
+                if others[3] > 0:
+                    scale = part[k] / others[3]
+                    for value in range(3):
+                        sums[at + value] += scale * others[value]
+                    sums[at + 3] += part[k]
 
 
 @njit(cache=True, nogil=True)
@@ -140,15 +172,19 @@ def _add_clear(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _add_edges(  # type: ignore[no-untyped-def]
-    luma, colour, own, first, disparity, weight, tolerance, chosen, places, phases, sums, seen
+    planes, fetching, first, weight, y, shift, disparity, tolerance, chosen, places, phases, sums, seen
 ):
-    """Add what a camera sees at the chosen pixels of a row, at its contours."""
-    stride = own.shape[1] + 2 * BORDER
+    """Add what a camera sees at the chosen pixels of row y, at its contours."""
+    luma, colour, own = planes
+    height, width = own.shape
+    flat, stride = own.ravel(), np.uintp(width + 2 * BORDER)
     for x in chosen:
-        left, top = places[x] % stride - BORDER, places[x] // stride - BORDER
-        place, at = first + np.uintp(places[x]), np.uintp(4) * np.uintp(x)
+        d = disparity[x]
+        at_x, at_y, _ = place_of(x, y, d, shift[0], shift[1], width, height)
+        corner, steps = corner_of(at_x, at_y, width, height)
+        place, at, phase = first + np.uintp(places[x]), np.uintp(4) * np.uintp(x), np.uintp(phases[x])
         seen[x] += add_edge(
-            luma, colour, own, sums, at, place, left, top, phases[x], disparity[x], tolerance, weight
+            luma, colour, flat, fetching, sums, at, place, stride, corner, steps, phase, d, tolerance, weight
         )
 
 
@@ -195,8 +231,7 @@ def blend(
     stride = width + 2 * BORDER
     plane = (height + 2 * BORDER) * stride
     near_px, trust = np.float32(tolerance), np.float32(edge_trust)
-    seeing = cameras, (luma, colour, disparities, fetchable), shifts, weights, trust, fetching
-    surface, part, others = np.empty(9, np.float32), np.empty(9, np.float32), np.empty(4, np.float32)
+    seeing = cameras, (luma, colour, disparities.ravel(), fetchable), shifts, weights, trust, fetching
     high, low = np.empty(width + 2, np.float32), np.empty(width + 2, np.float32)
     places, phases = np.empty(width, np.int32), np.empty(width, np.int32)
     chosen = np.empty(width, np.int32)
@@ -207,8 +242,8 @@ def blend(
         sums[:] = 0
         seen[:] = 0
         for i in range(cameras.size):
-            start = np.uintp(cameras[i] * plane)
-            _locate(y, disparity, (shifts[i, 0], shifts[i, 1]), shape, places, phases)
+            start, shift = np.uintp(cameras[i] * plane), (shifts[i, 0], shifts[i, 1])
+            _locate(y, disparity, shift, shape, places, phases)
             count = _add_clear(
                 (luma, colour, fetchable),
                 fetching,
@@ -224,12 +259,13 @@ def blend(
                 chosen,
             )
             _add_edges(
-                luma,
-                colour,
-                disparities[cameras[i]],
+                (luma, colour, disparities[cameras[i]]),
+                fetching,
                 start,
-                disparity,
                 weights[i] * trust,
+                y,
+                shift,
+                disparity,
                 near_px,
                 chosen[:count],
                 places,
@@ -238,8 +274,6 @@ def blend(
                 seen,
             )
         count = _find_contours(y, view_disparity, near_px, high, low, marks, chosen)
-        for x in chosen[:count]:
-            if seen[x] > 0:  # with its neighbours' colour alone it would spread that into holes beside it
-                _add_surfaces(x, y, sums[x], view_disparity, seeing, near_px, others, surface, part)
+        _add_surfaces(y, chosen[:count], seen, view_disparity, seeing, near_px, flat)
         for x in range(width):
             store_colour(flat, np.uintp(4) * np.uintp(x), pixels, np.uintp(3) * np.uintp(y * width + x))

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvcodec.kernels.lane_vectors import add_lanes, store_lanes
 from mvcodec.kernels.view_fetch import place_of
-from mvcodec.kernels.view_vectors import add_lanes, store_lanes
 
 FloatMap = NDArray[np.float32]
 
@@ -40,7 +40,7 @@ def pack(picture: NDArray[np.uint8], out: NDArray[np.uint64]) -> None:
 
 
 def _shares() -> NDArray[np.uint16]:
-    """uint16 (STEPS^2, 16): what the four pixels around a place count, see `view_vectors.add_lanes`."""
+    """uint16 (STEPS^2, 16): what the four pixels around a place count, see `lane_vectors.add_lanes`."""
     down, right = np.mgrid[:STEPS, :STEPS][:, :, :, None]
     ones = np.ones(4, np.int64)
     above = [(STEPS - down) * (STEPS - right) * ones, (STEPS - down) * right * ones]

@@ -54,6 +54,10 @@ def fetch_weights(a: float) -> NDArray[np.int16]:
     return np.hstack([whole, np.rint(colour.reshape(-1, 8) * ONE).astype(np.int16)]).ravel()
 
 
+LEAST_SHARE = ONE // 1000
+"""Less of a pixel is not seen."""
+
+
 def _address(builder, pointer, index):  # type: ignore[no-untyped-def]
     return builder.bitcast(builder.gep(pointer, [index]), FOUR.as_pointer())
 
@@ -68,13 +72,13 @@ def _pick(builder, vector, *lanes, other=None):  # type: ignore[no-untyped-def]
     return builder.shuffle_vector(vector, ir.Constant(FOUR, ir.Undefined) if other is None else other, mask)
 
 
-def _fill(builder, number):  # type: ignore[no-untyped-def]
+def fill(builder, number):  # type: ignore[no-untyped-def]
     """A number in all lanes."""
     one = builder.insert_element(ir.Constant(FOUR, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
     return _pick(builder, one, 0, 0, 0, 0)
 
 
-def _add_product(builder, total, one, other):  # type: ignore[no-untyped-def]
+def add_product(builder, total, one, other):  # type: ignore[no-untyped-def]
     return builder.fadd(total, builder.fmul(one, other))
 
 
@@ -148,8 +152,8 @@ def _add_fetched(_typing, luma, colour, weights, sums, at, place, stride, phase,
         pixel = _shuffle(builder, grey, differences, [0, 4, 5, 0])
         unit = LEVELS * ONE
         pixel = builder.insert_element(pixel, ir.Constant(WORD, unit), ir.Constant(WORD, 3))
-        factor = _fill(builder, builder.fmul(weight, ir.Constant(ir.FloatType(), 1.0 / unit)))
-        total = _add_product(builder, _load(builder, sums, at), factor, builder.sitofp(pixel, FOUR))
+        factor = fill(builder, builder.fmul(weight, ir.Constant(ir.FloatType(), 1.0 / unit)))
+        total = add_product(builder, _load(builder, sums, at), factor, builder.sitofp(pixel, FOUR))
         builder.store(total, _address(builder, sums, at), align=WORD_BYTES)
         return context.get_dummy_value()
 
@@ -196,6 +200,69 @@ def _pointers(context, builder, signature, values):  # type: ignore[no-untyped-d
     ]
 
 
+def _add_edge(  # type: ignore[no-untyped-def]
+    _typing, luma, colour, own, weights, sums, at, place, stride, here, steps, phase, d, tolerance, weight
+):
+    """Add weight * (Y, R - Y, B - Y, 1) of one place to four of `sums`, as `add_fetched` does, but linear
+    between those of the four pixels there that lie at disparity d, each by its share; 1 if there is any.
+
+    Args:
+        own: flat float32, the camera's map without border.
+        here, steps: uintp; index into `own` of the pixel up left; (to the right one, to the lower one).
+        d, tolerance, weight: float32.
+    """
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        luma, colour, own, weights, sums = (
+            context.make_array(kind)(context, builder, value).data
+            for kind, value in zip(signature.args[:5], values[:5], strict=True)
+        )
+        at, place, stride, here, steps, phase, d, tolerance, weight = values[5:]
+        right, down = (builder.extract_value(steps, lane) for lane in (0, 1))
+        words = ir.VectorType(WORD, 4)
+        # Columns, each from above, as `fetch_weights` has them.
+        depths: Any = ir.Constant(FOUR, ir.Undefined)
+        for lane, step in enumerate((None, down, right, builder.add(right, down))):
+            index = here if step is None else builder.add(here, step)
+            depth = builder.load(builder.gep(own, [index]))
+            depths = builder.insert_element(depths, depth, ir.Constant(WORD, lane))
+        apart = builder.fsub(depths, fill(builder, d))
+        far = builder.fcmp_ordered(">", apart, fill(builder, tolerance))
+        low = builder.fcmp_ordered("<", apart, fill(builder, builder.fneg(tolerance)))
+        share = builder.add(builder.mul(phase, ir.Constant(phase.type, SHARES)), ir.Constant(phase.type, 16))
+        linear = _shorts(builder, weights, share, 8)
+        linear = builder.sext(_shuffle(builder, linear, linear, [0, 1, 4, 5]), words)
+        parts = builder.select(builder.or_(far, low), ir.Constant(words, [0] * 4), linear)
+        below = builder.add(place, stride)
+        above, under = _shorts(builder, luma, place, 2), _shorts(builder, luma, below, 2)
+        grey = _shuffle(builder, above, under, [0, 2, 1, 3])
+        two = ir.Constant(place.type, 2)
+        above, under = (_shorts(builder, colour, builder.mul(row, two), 4) for row in (place, below))
+        red, blue = (_shuffle(builder, above, under, lanes) for lanes in ([0, 4, 2, 6], [1, 5, 3, 7]))
+        products = [builder.mul(parts, builder.sext(plane, words)) for plane in (grey, red, blue)] + [parts]
+        (grey, red), (blue, whole) = products[:2], products[2:]
+        left = builder.add(
+            _shuffle(builder, grey, red, [0, 4, 1, 5]), _shuffle(builder, grey, red, [2, 6, 3, 7])
+        )
+        end = builder.add(
+            _shuffle(builder, blue, whole, [0, 4, 1, 5]), _shuffle(builder, blue, whole, [2, 6, 3, 7])
+        )
+        pixel = builder.add(
+            _shuffle(builder, left, end, [0, 1, 4, 5]), _shuffle(builder, left, end, [2, 3, 6, 7])
+        )
+        total = builder.extract_element(pixel, ir.Constant(WORD, 3))
+        seen = builder.icmp_signed(">", total, ir.Constant(WORD, LEAST_SHARE))
+        weight = builder.select(seen, weight, ir.Constant(ir.FloatType(), 0.0))
+        unit = ir.Constant(FOUR, [1.0 / (LEVELS * ONE)] * 3 + [1.0 / ONE])
+        factor = builder.fmul(fill(builder, weight), unit)
+        total = add_product(builder, _load(builder, sums, at), factor, builder.sitofp(pixel, FOUR))
+        builder.store(total, _address(builder, sums, at), align=WORD_BYTES)
+        return builder.zext(seen, ir.IntType(8))
+
+    arguments = luma, colour, own, weights, sums, at, place, stride, here, steps, phase, d, tolerance, weight
+    return types.uint8(*arguments), generate
+
+
 def _clip(builder, numbers, low, high):  # type: ignore[no-untyped-def]
     """Numbers kept within low..high."""
     for sign, limit in ((">", low), ("<", high)):
@@ -204,90 +271,13 @@ def _clip(builder, numbers, low, high):  # type: ignore[no-untyped-def]
     return numbers
 
 
-def _store_bytes(builder, numbers, pointer, index):  # type: ignore[no-untyped-def]
+def store_bytes(builder, numbers, pointer, index):  # type: ignore[no-untyped-def]
     """Store the first three of four numbers of 0..255 as bytes, rounded down."""
     whole = builder.fptosi(numbers, ir.VectorType(ir.IntType(32), 4))
     bytes_ = builder.trunc(whole, ir.VectorType(ir.IntType(8), 4))
     for lane in range(3):
         byte = builder.extract_element(bytes_, ir.Constant(ir.IntType(32), lane))
         builder.store(byte, builder.gep(pointer, [builder.add(index, ir.Constant(index.type, lane))]))
-
-
-def _add_lanes(_typing, packed, shares, lanes, at, place, stride, phase, weight):  # type: ignore[no-untyped-def]
-    """Add weight * (red, green, blue, 1) of a place between pixels to `lanes[at]`, in whole numbers.
-
-    Args:
-        packed: flat uint64, four lanes of 16 bits a pixel.
-        shares: uint16 (phases, 16), in 256ths, those of the upper two pixels four times each, then the lower.
-        lanes: flat uint64.
-        at, place, stride: uintp; index into `lanes`, of the pixel up left in `packed`, pixels of its rows.
-        phase: uintp, row of `shares`.
-        weight: uint64, below 2^16.
-    """
-
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        packed, shares, lanes = (
-            context.make_array(kind)(context, builder, value).data
-            for kind, value in zip(signature.args[:3], values[:3], strict=True)
-        )
-        at, place, stride, phase, weight = values[3:]
-        four, eight = ir.VectorType(SHORT, 4), ir.VectorType(SHORT, 8)
-
-        def pixels(pointer, index, kind):  # type: ignore[no-untyped-def]
-            return builder.bitcast(builder.gep(pointer, [index]), kind.as_pointer())
-
-        row = builder.mul(phase, ir.Constant(phase.type, 16))
-        total = None
-        for step, half in ((None, 0), (stride, 8)):
-            index = place if step is None else builder.add(place, step)
-            share = builder.add(row, ir.Constant(row.type, half))
-            product = builder.mul(
-                builder.load(pixels(packed, index, eight), align=8),
-                builder.load(pixels(shares, share, eight), align=2),
-            )
-            total = product if total is None else builder.add(total, product)
-        none = ir.Constant(eight, ir.Undefined)
-        left, right = (
-            builder.shuffle_vector(total, none, ir.Constant(ir.VectorType(ir.IntType(32), 4), list(part)))
-            for part in (range(4), range(4, 8))
-        )
-        summed = builder.add(builder.add(left, right), ir.Constant(four, [128] * 4))
-        fetched = builder.lshr(summed, ir.Constant(four, [8] * 4))
-        one = builder.insert_element(
-            ir.Constant(four, ir.Undefined), builder.trunc(weight, SHORT), ir.Constant(ir.IntType(32), 0)
-        )
-        zero = ir.Constant(ir.VectorType(ir.IntType(32), 4), [0] * 4)
-        factors = builder.shuffle_vector(one, ir.Constant(four, ir.Undefined), zero)
-        where = pixels(lanes, at, four)
-        builder.store(
-            builder.add(builder.load(where, align=8), builder.mul(fetched, factors)), where, align=8
-        )
-        return context.get_dummy_value()
-
-    return types.void(packed, shares, lanes, at, place, stride, phase, weight), generate
-
-
-def _store_lanes(_typing, lanes, pixels, place):  # type: ignore[no-untyped-def]
-    """Store as RGB what four lanes of 16 bits (uint64) hold, divided by the uppermost, rounded.
-
-    Args:
-        lanes: weighted sums of red, green and blue, and the sum of weights; 0 makes black.
-        pixels: flat uint8, stored from index `place` (uintp) on.
-    """
-
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        pixels = context.make_array(signature.args[1])(context, builder, values[1]).data
-        lanes = builder.bitcast(values[0], ir.VectorType(ir.IntType(16), 4))
-        numbers = builder.sitofp(builder.zext(lanes, ir.VectorType(ir.IntType(32), 4)), FOUR)
-        weight = builder.extract_element(numbers, ir.Constant(ir.IntType(32), 3))
-        one = ir.Constant(ir.FloatType(), 1.0)
-        none = builder.fcmp_ordered("<", weight, one)
-        scale = _fill(builder, builder.fdiv(one, builder.select(none, one, weight)))
-        rounded = _add_product(builder, ir.Constant(FOUR, [0.5] * 4), numbers, scale)
-        _store_bytes(builder, rounded, pixels, values[2])
-        return context.get_dummy_value()
-
-    return types.void(lanes, pixels, place), generate
 
 
 def _store_colour(_typing, sums, at, pixels, place):  # type: ignore[no-untyped-def]
@@ -309,21 +299,20 @@ def _store_colour(_typing, sums, at, pixels, place):  # type: ignore[no-untyped-
         none = builder.fcmp_ordered("==", weight, ir.Constant(ir.FloatType(), 0.0))
         one = ir.Constant(ir.FloatType(), 1.0)
         scale = builder.fdiv(one, builder.select(none, one, weight))
-        found = builder.fmul(found, _fill(builder, scale))
+        found = builder.fmul(found, fill(builder, scale))
         colour = _pick(builder, found, 0, 0, 0, 0)
         for lane, parts in ((1, [1.0, -0.299 / 0.587, 0.0, 0.0]), (2, [0.0, -0.114 / 0.587, 1.0, 0.0])):
             difference = _pick(builder, found, lane, lane, lane, lane)
-            colour = _add_product(builder, colour, difference, ir.Constant(FOUR, parts))
+            colour = add_product(builder, colour, difference, ir.Constant(FOUR, parts))
         rounded = builder.fadd(colour, ir.Constant(FOUR, [0.5] * 4))
-        _store_bytes(builder, _clip(builder, rounded, 0.0, 255.0), pixels, values[3])
+        store_bytes(builder, _clip(builder, rounded, 0.0, 255.0), pixels, values[3])
         return context.get_dummy_value()
 
     return types.void(sums, at, pixels, place), generate
 
 
 add_fetched: Any = intrinsic(_add_fetched)
+add_edge: Any = intrinsic(_add_edge)
 fetch_luma: Any = intrinsic(_fetch_luma)
 fetch_colour: Any = intrinsic(_fetch_colour)
 store_colour: Any = intrinsic(_store_colour)
-store_lanes: Any = intrinsic(_store_lanes)
-add_lanes: Any = intrinsic(_add_lanes)
