@@ -91,3 +91,24 @@ def test_a_readme_without_the_marks_is_refused(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert "no place for the figures" in done.stderr
     assert (tmp_path / "README.md").read_text() == "nothing"
+
+
+def test_speed_has_a_line_for_each_work(tmp_path: Path) -> None:
+    row = {"ours_ms": 19.1, "theirs_ms": 3.7, "ours_cpu_ms": 30.0, "theirs_cpu_ms": 6.0, "ratio": 5.162}
+    rows = [
+        row | {"work": "a / b", "must": 5, "by_cpu": False, "note": "52.5 frame sets a second; must be 25"},
+        row | {"work": "c / d", "must": None, "by_cpu": True, "note": ""},
+    ]
+    (tmp_path / "README.md").write_text(README)
+    (tmp_path / "speed.json").write_text(json.dumps({"rows": rows}))
+    command: list[str | Path] = [
+        sys.executable,
+        TOOL,
+        tmp_path / "README.md",
+        "--speed",
+        tmp_path / "speed.json",
+    ]
+    subprocess.run(command, check=True)
+    lines = (tmp_path / "README.md").read_text().splitlines()
+    assert "| a / b, 52.5 frame sets a second | 19.1 | 3.7 | 5.16 | 5 |" in lines
+    assert "| c / d | 30.0 | 6.0 | 5.16 |  |" in lines

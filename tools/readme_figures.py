@@ -3,6 +3,8 @@
 python tools/benchmark.py --data ../shared/data --what quality --json > quality.json
 mvcodec evaluate ../shared/data/SET --output REPORT ...
 python tools/readme_figures.py docs/quality.md --quality quality.json --reports REPORT/report.json ...
+python benchmarks/speed.py --json > speed.json
+python tools/readme_figures.py docs/speed.md --speed speed.json
 """
 
 from __future__ import annotations
@@ -24,9 +26,8 @@ def main() -> int:
     """Parse, read, write."""
     parser = argparse.ArgumentParser(description="A document's tables of figures, from measurements.")
     parser.add_argument("document", type=Path, metavar="DOCUMENT")
-    parser.add_argument(
-        "--quality", type=Path, required=True, metavar="FILE.json", help="of tools/benchmark.py"
-    )
+    parser.add_argument("--quality", type=Path, metavar="FILE.json", help="of tools/benchmark.py")
+    parser.add_argument("--speed", type=Path, metavar="FILE.json", help="of benchmarks/speed.py")
     parser.add_argument(
         "--reports", type=Path, nargs="*", default=[], metavar="REPORT.json", help="of evaluate"
     )
@@ -34,9 +35,11 @@ def main() -> int:
     try:
         text = arguments.document.read_text(encoding="utf-8")
         tables = [
-            quality_table(_read(arguments.quality)),
-            rate_table([_read(path) for path in arguments.reports]),
+            table(_read(path))
+            for table, path in ((quality_table, arguments.quality), (speed_table, arguments.speed))
+            if path is not None
         ]
+        tables.append(rate_table([_read(path) for path in arguments.reports]))
         write_bytes(arguments.document, replaced(text, tables, arguments.document).encode())
     except (MvCodecError, OSError) as error:
         print(f"readme_figures: {error}", file=sys.stderr)
@@ -63,6 +66,18 @@ def quality_table(benchmark: Mapping[str, Any]) -> str:
     lines = ["| set | Y-PSNR, dB | worst view, dB | SSIM |", "|---|---|---|---|"]
     for name, row in sorted(benchmark["sets"].items()):
         lines.append(f"| {name} | {row['psnr_y']:.2f} | {row['worst_psnr_y']:.2f} | {row['ssim']:.4f} |")
+    return "\n".join(lines)
+
+
+def speed_table(benchmark: Mapping[str, Any]) -> str:
+    """Our times beside those of stock code on the same pictures, one line a work."""
+    lines = ["| work | ours, ms | stock, ms | ratio | goal |", "|---|---|---|---|---|"]
+    for row in benchmark["rows"]:
+        kind = "cpu_" if row["by_cpu"] else ""
+        ours, theirs = row[f"ours_{kind}ms"], row[f"theirs_{kind}ms"]
+        rate = f", {row['note'].split(';')[0]}" if row["note"] else ""
+        goal = "" if row["must"] is None else f"{row['must']:g}"
+        lines.append(f"| {row['work']}{rate} | {ours:.1f} | {theirs:.1f} | {row['ratio']:.2f} | {goal} |")
     return "\n".join(lines)
 
 
