@@ -281,6 +281,34 @@ def median3(disparity: FloatMap) -> FloatMap:
     return np.asarray(np.median(windows, axis=(2, 3)), np.float32)
 
 
+def smooth_over(disparity: FloatMap, step: float, reach: int, fewest: int) -> FloatMap:
+    height, width = disparity.shape
+    out, met = disparity.copy(), set[tuple[int, int]]()
+
+    def near(place: tuple[int, int], far: int) -> list[tuple[int, int]]:
+        y, x = place
+        rows, columns = range(max(y - far, 0), min(y + far + 1, height)), range(max(x - far, 0), x + far + 1)
+        return [(v, u) for v in rows for u in columns if u < width]
+
+    def alike(one: tuple[int, int], other: tuple[int, int]) -> bool:
+        return bool(abs(disparity[one] - disparity[other]) <= step)
+
+    for place in ((y, x) for y in range(height) for x in range(width)):
+        if place in met:
+            continue
+        piece = [place]
+        met.add(place)
+        for here in piece:
+            found = [there for there in near(here, reach) if there not in met and alike(here, there)]
+            met.update(found)
+            piece += found
+        around = [disparity[there] for here in piece for there in near(here, 1) if not alike(here, there)]
+        if len(piece) < fewest and around:
+            for here in piece:
+                out[here] = sorted(around)[len(around) // 2]
+    return out
+
+
 def restore_thin(voted: FloatMap, tolerance: float, cleaned: FloatMap) -> FloatMap:
     out = cleaned.copy()
     height, width = voted.shape
@@ -336,7 +364,8 @@ def render(
     limits = Limits(settings.tolerance_px, settings.contrast, settings.ratio, settings.denial)
     voted = vote(moved, ballot, limits)
     cleaned = restore_thin(voted, settings.tolerance_px, median3(voted))
-    disparity = fill_background(cleaned, decoded.disparity_range_px[0])
+    filled = fill_background(cleaned, decoded.disparity_range_px[0])
+    disparity = smooth_over(filled, settings.tolerance_px, 1, settings.speck_area_px)
     colours, seen_by = blend(sources, disparity, settings)
     rounded = np.floor(colours + 0.5).astype(np.uint8)
     painted = paint_holes(rounded, disparity, seen_by, settings.tolerance_px, settings.hole_reach_px)

@@ -40,6 +40,7 @@ MATCHING = (
     "subpixel_pull.add_pull",
     "geodesic.carry",
     "enlargement.enlarge",
+    "specks.smooth_over",
     "matching_rows.consistent",
     "matching_rows.fill_rows",
     "matching_rows.fuse_maps",

@@ -12,6 +12,7 @@ import numpy as np
 from mvcodec.frames import DisparityMap, FloatMap, Mask
 
 SPECKLE_STEP_PX = 1.0
+SPECK_STEP_PX, SPECK_REACH_PX = 1.5, 2
 MEDIAN_SIZE = 5
 _SIXTEENTHS = 16
 _SPECKLE_MARK = -32768
@@ -83,6 +84,20 @@ def drop_speckles(values_px: FloatMap, valid: Mask, min_area_px: int) -> Mask:
     marked = np.where(valid, scaled, _SPECKLE_MARK).astype(np.int16)
     cv2.filterSpeckles(marked, _SPECKLE_MARK, min_area_px, int(SPECKLE_STEP_PX * _SIXTEENTHS))
     return np.asarray(marked != _SPECKLE_MARK)
+
+
+def without_specks(values_px: FloatMap, fewest: int) -> FloatMap:
+    """A map whose pieces of fewer than `fewest` pixels are as what is around them, see `specks.smooth_over`.
+
+    Pieces with a gap of one pixel between them are one: wires break into such.
+    """
+    from mvcodec.kernels.table import kernel
+
+    smooth = np.empty_like(values_px)
+    kernel("specks.smooth_over")(
+        np.ascontiguousarray(values_px), SPECK_STEP_PX, SPECK_REACH_PX, fewest, smooth
+    )
+    return smooth
 
 
 def cross_check(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
-from mvcodec.stereo.consistency import drop_speckles, fill_from_farther, median
+from mvcodec.stereo.consistency import drop_speckles, fill_from_farther, median, without_specks
 from mvcodec.stereo.exposure import camera_gains
 from mvcodec.stereo.joint_settings import JointSettings
 from mvcodec.stereo.matching_view import CameraPartners, MatchingViews, equal_grey, prepare_views
@@ -76,7 +76,15 @@ class Joint:
                 cameras,
             )
             maps = dict(zip(cameras, extended, strict=True))
-        return {camera: DisparityMap(maps[camera], valid[camera]) for camera in cameras}
+        return self._finished(maps, valid)
+
+    def _finished(
+        self, maps: Mapping[Position, FloatMap], valid: Mapping[Position, Mask]
+    ) -> dict[Position, DisparityMap]:
+        clean = run_all(lambda values: without_specks(values, self.settings.speck_area_px), maps.values())
+        return {
+            camera: DisparityMap(values, valid[camera]) for camera, values in zip(maps, clean, strict=True)
+        }
 
     def _measured_gains(
         self,
@@ -133,7 +141,7 @@ class Joint:
         values = {camera: found.values_px for camera, found in maps.items()}
         valid = {camera: found.valid for camera, found in maps.items()}
         moved = _subpixel(array, greys, values, valid, range_px, self.settings.full_size_steps)
-        return {camera: DisparityMap(moved[camera], valid[camera]) for camera in maps}
+        return self._finished(moved, valid)
 
     def _matched(
         self,

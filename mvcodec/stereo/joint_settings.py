@@ -69,6 +69,12 @@ class JointSettings:
         high=1e6,
     )
     thin_area_px: int = setting(16, "and that have at least this many pixels", low=0, high=1e6)
+    speck_area_px: int = setting(
+        30,
+        "smaller pieces that contradict all around them give way to that, pixels; 1: none",
+        low=1,
+        high=1000,
+    )
     subpixel_steps: int = setting(3, "steps of sub-pixel refinement", low=0, high=20)
     full_size_steps: int = setting(
         0, "steps of it after maps of small copies were brought back", low=0, high=20

@@ -58,6 +58,12 @@ class LayeredSettings:
         low=1e-3,
         high=1e3,
     )
+    speck_area_px: int = setting(
+        30,
+        "smaller pieces of a view that contradict all around them give way to that, pixels; 1: none",
+        low=1,
+        high=1000,
+    )
     edge_trust: float = setting(0.5, "weight of pixels fetched at a camera's contours", low=1e-3, high=1)
     sharpness: float = setting(-0.7, "Keys' parameter a of the cubic fetch", low=-1, high=0)
     hole_reach_px: int = setting(64, "how far holes are painted from, px", low=1, high=4096)
@@ -124,6 +130,7 @@ class Layered:
             self.settings.contrast,
             self.settings.denial,
             self.settings.reach_px,
+            self.settings.speck_area_px,
         )
         check_threads(thread_count)
         self._threads = thread_count

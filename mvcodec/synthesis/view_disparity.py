@@ -22,6 +22,7 @@ class Ballot:
     contrast: float
     denial: float
     reach_px: float
+    speck_area_px: int = 1
 
 
 def view_disparity(
@@ -76,4 +77,8 @@ def view_disparity(
         kernel("view_depth.fill_background")(cleaned, background_px, first, last)
 
     run_in_bands(height, clean)
-    return cleaned
+    if ballot.speck_area_px == 1:
+        return cleaned
+    smooth = np.empty_like(cleaned)
+    kernel("specks.smooth_over")(cleaned, ballot.tolerance_px, 1, ballot.speck_area_px, smooth)
+    return smooth

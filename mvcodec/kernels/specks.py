@@ -1,0 +1,80 @@
+"""Small pieces of a map that contradict all that is around them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mvcodec.kernels.view_marks import list_marked
+
+FloatMap = NDArray[np.float32]
+
+
+@njit(cache=True, nogil=True)
+def _is_own(v, u, rows, columns, count):  # type: ignore[no-untyped-def]
+    own = False
+    for i in range(count):
+        own |= (rows[i] == v) & (columns[i] == u)
+    return own
+
+
+@njit(cache=True, nogil=True)
+def _gather(disparity, y, x, step, reach, gathered, rows, columns, around):  # type: ignore[no-untyped-def]
+    """How many pixels the piece of (x, y) has, 0 where too many, and how many values are around it."""
+    height, width = disparity.shape
+    rows[0], columns[0] = y, x
+    gathered[y, x] = True
+    count, beside, at = 1, 0, 0
+    while at < count:
+        row, column = rows[at], columns[at]
+        at += 1
+        for v in range(max(row - reach, 0), min(row + reach + 1, height)):
+            for u in range(max(column - reach, 0), min(column + reach + 1, width)):
+                if abs(disparity[v, u] - disparity[row, column]) > step:
+                    if max(abs(v - row), abs(u - column)) == 1:
+                        around[beside] = disparity[v, u]
+                        beside += 1
+                elif not gathered[v, u]:
+                    if count >= len(rows) - 1:
+                        return 0, 0
+                    gathered[v, u] = True
+                    rows[count], columns[count] = v, u
+                    count += 1
+                elif not _is_own(v, u, rows, columns, count):
+                    # It was met before and is not a small piece: that would have been gathered as a whole.
+                    return 0, 0
+    return (count if count < len(rows) else 0), beside
+
+
+@njit(cache=True, nogil=True)
+def smooth_over(disparity: FloatMap, step: float, reach: int, fewest: int, out: FloatMap) -> None:
+    """Give pieces of fewer than `fewest` pixels the median of what is around them.
+
+    Args:
+        disparity: float32 (H, W), px, C-contiguous.
+        step: pixels that differ by no more are of one piece, px,
+        reach: if they are no further apart than this, px along rows and columns.
+        fewest: 1 or more; 1 changes nothing.
+        out: float32 (H, W), written.
+    """
+    height, width = disparity.shape
+    apart = np.float32(step)
+    gathered = np.zeros((height, width), np.bool_)
+    rows, columns = np.empty((2, fewest), np.int32)
+    around = np.empty(8 * fewest, np.float32)
+    marks, chosen = np.empty(width, np.uint8), np.empty(width, np.int32)
+    out[:] = disparity
+    for y in range(height):
+        above, here, below = disparity[max(y - 1, 0)], disparity[y], disparity[min(y + 1, height - 1)]
+        for x in range(width):
+            marks[x] = max(abs(above[x] - here[x]), abs(below[x] - here[x])) > apart
+        for x in range(1, width):
+            marks[x] |= abs(here[x] - here[x - 1]) > apart
+        for x in chosen[: list_marked(marks, chosen)]:
+            if not gathered[y, x]:
+                count, beside = _gather(disparity, y, x, apart, reach, gathered, rows, columns, around)
+                if count and beside:
+                    middle = np.sort(around[:beside])[beside // 2]
+                    for i in range(count):
+                        out[rows[i], columns[i]] = middle
