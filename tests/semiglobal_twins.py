@@ -85,7 +85,7 @@ def joint_costs(
             volume[y, x, level] = outside_cost
             continue
         alone = lone_cost if len(steps) > 1 else 0
-        other = (found[0] + found[1] + 1) // 2 if len(found) > 1 else max(plain[0] + alone, outside_cost - 10)
+        other = (found[0] + found[1] + 1) // 2 if len(found) > 1 else plain[0] + alone + 10
         volume[y, x, level] = min(found[0] + alone, other)
     return volume
 

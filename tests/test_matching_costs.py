@@ -100,9 +100,9 @@ def test_a_match_in_a_direction_without_detail_does_not_outvote_the_other() -> N
     assert (uniform_costs([0, 20], [0, 30], beside_and_below, blind_rows=40) == 40 + 6).all()
 
 
-def test_a_blind_partner_is_better_than_none() -> None:
+def test_of_a_blind_partner_counts_all_that_it_tells_where_it_is_the_only_one() -> None:
     costs = uniform_costs([0, 0], [0, 0], [(0, 0), (0, 1)], blind_rows=120)[0]  # below: in frame at 0 px
-    assert costs.T.tolist() == [[6] * 6, [100 - 10] * 6, [100 - 10] * 6]
+    assert costs.T.tolist() == [[6] * 6, [6 + 10] * 6, [6 + 10] * 6]
 
 
 def test_a_direction_is_blind_where_edges_run_along_it() -> None:

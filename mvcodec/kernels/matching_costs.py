@@ -33,8 +33,8 @@ Volume = NDArray[np.uint8]
 OUTSIDE = np.uint8(255)
 """Marks where a partner's picture ends."""
 
-IN_FRAME_LEAD = 10
-"""Where one partner alone holds the pixel, `blind` makes no match dearer than `outside_cost` less this."""
+ONLY_BLIND_COST = 10
+"""The most that counts of `blind` where one partner alone holds the pixel."""
 
 
 @njit(cache=True, nogil=True)
@@ -139,8 +139,8 @@ def joint_costs(
     zero, nowhere = fill(np.uint8(0)), fill(OUTSIDE)
     limit, most_distance = fill(np.uint8(colour_limit)), fill(np.uint8(most_bits))
     each_bit = fill(np.uint8(bit_cost))
-    inside = fill(np.uint8(max(outside_cost - IN_FRAME_LEAD, 0)))
     alone = fill(np.uint8(lone_cost)) if len(steps) > 1 else zero
+    only_cost = plus(alone, fill(np.uint8(ONLY_BLIND_COST)))
     outside = np.full(padded, OUTSIDE, np.uint8)
     outside[LANES : LANES + width] = 0
     left, up = np.empty((2, len(steps), levels), np.int64)
@@ -179,8 +179,8 @@ def joint_costs(
                     second = least(second, most(best, cost))
                     best = least(best, cost)
                 lone = plus(best, alone)
-                # One partner's picture holds the pixel: that it is blind is no reason to leave it.
-                only = least(lone, most(plus(plain, alone), inside))
+                # One partner alone holds the pixel: what it tells is all there is.
+                only = least(lone, plus(plain, only_cost))
                 cost = choose(second, nowhere, only, least(lone, mean(best, second)))
                 cost = choose(best, nowhere, fill(np.uint8(outside_cost)), cost)
                 store(flat, np.uint64((at * levels + level) * columns + x), cost)
