@@ -25,7 +25,7 @@ class JointSettings:
     most_bits: int = setting(21, "bits that count at most", low=0, high=64)
     lone_cost: int = setting(12, "added where one partner alone must see the pixel", low=0, high=50)
     blind_cost: int = setting(
-        60,
+        40,
         "added to partners in whose direction a picture has no detail, while it has across",
         low=0,
         high=100,
