@@ -72,10 +72,14 @@ def blindness(grey: NDArray[np.uint8], radii: tuple[int, int], cost: int) -> NDA
         uint8 (2, H, W): up to `cost`, the weaker slopes are along the one direction than along the other.
     """
     window = 2 * radii[0] + 1, 2 * radii[1] + 1
-    slopes = [cv2.Sobel(grey, cv2.CV_32F, along, 1 - along, ksize=1) for along in (1, 0)]
-    detail = [np.sqrt(cv2.blur(slope * slope, window) + NOISE_LEVELS**2) for slope in slopes]
-    both = [1 - own / other for own, other in (detail, detail[::-1])]
-    return np.asarray(np.stack(both).clip(0, 1) * cost + 0.5, np.uint8)
+    framed = cv2.copyMakeBorder(grey, 1, 1, 1, 1, cv2.BORDER_REFLECT_101)
+    beside, above = framed[1:-1], framed[:, 1:-1]
+    slopes = cv2.absdiff(beside[:, 2:], beside[:, :-2]), cv2.absdiff(above[2:], above[:-2])
+    squares = [cv2.sqrBoxFilter(slope, cv2.CV_32F, window) + np.float32(NOISE_LEVELS**2) for slope in slopes]
+    found = np.empty((2, *grey.shape), np.uint8)
+    for own, other, out in zip(squares, squares[::-1], found, strict=True):
+        cv2.convertScaleAbs(np.maximum(1 - cv2.sqrt(cv2.divide(own, other)), 0), out, cost)
+    return found
 
 
 def prepare_views(
