@@ -15,7 +15,8 @@ from mvcodec.kernels.view_fetch import place_of
 
 FloatMap = NDArray[np.float32]
 
-STEPS = 16
+BITS = 4
+STEPS = 1 << BITS
 """Places between two pixels that a fetch tells apart. The products of both axes fill a lane's upper byte."""
 WEIGHTS = 256
 """The weights of a view's cameras may sum up to this, so that no lane overflows."""
@@ -57,14 +58,16 @@ def _locate(y, disparity, shift, shape, places, nearest, phases):  # type: ignor
     flat index of the nearest pixel in its map, and which of SHARES count."""
     height, width = shape
     shift_x, shift_y = shift
-    steps, half, one = np.int32(STEPS), np.int32(STEPS // 2), np.float32(STEPS)
+    bits, last = np.int32(BITS), np.int32(STEPS - 1)
+    half, one = np.int32(STEPS // 2), np.float32(STEPS)
     for x in range(width):
         at_x, at_y, inside = place_of(x, y, disparity[x], shift_x, shift_y, width, height)
         fine_x = np.int32(at_x * one + np.float32(0.5))
         fine_y = np.int32(at_y * one + np.float32(0.5))
-        phases[x] = fine_y % steps * steps + fine_x % steps
-        nearest[x] = (fine_y + half) // steps * np.int32(width) + (fine_x + half) // steps
-        places[x] = fine_y // steps * np.int32(width + 1) + fine_x // steps if inside else np.int32(-1)
+        phases[x] = ((fine_y & last) << bits) + (fine_x & last)
+        nearest[x] = ((fine_y + half) >> bits) * np.int32(width) + ((fine_x + half) >> bits)
+        place = (fine_y >> bits) * np.int32(width + 1) + (fine_x >> bits)
+        places[x] = place if inside else np.int32(-1)
 
 
 @njit(cache=True, nogil=True)
