@@ -1,6 +1,6 @@
 """How fast: the encoder, matching, views and decoding over stock code on the same pictures in the same run.
 
-    python benchmarks/speed.py [--json] [--rows encoding,matching,memory,views,decoding,delay] [--threads N]
+    python benchmarks/speed.py [--json] [--rows encoding,matching,memory,views,decoding,...] [--threads N]
 
 Both sides of a row take turns; the least time of each counts, so that other work on the machine matters
 little. Two threads; the stock match has one. The material is the sample scene, rendered in memory.
@@ -21,13 +21,14 @@ import numba
 import numpy as np
 from speed_encoding import MEMORY_RANGE, MEMORY_SIZE, encoding_rows, matching_rows, peak_mib
 from speed_measures import Row
+from speed_threads import thread_rows
 from speed_viewing import decoding_rows, delay_row, viewing_rows
 
 import mvcodec
 from mvcodec.workers import set_threads, thread_count
 
 MEMORY_GOALS = 1536, 1024
-KINDS = ("encoding", "matching", "memory", "views", "decoding", "delay")
+KINDS = ("encoding", "matching", "memory", "views", "decoding", "threads", "delay")
 
 
 def machine() -> dict[str, str | int]:
@@ -57,6 +58,8 @@ def rows_of(kinds: list[str]) -> Iterator[Row]:
         yield from viewing_rows()
     if "decoding" in kinds:
         yield from decoding_rows()
+    if "threads" in kinds:
+        yield from thread_rows()
     if "delay" in kinds:
         yield delay_row()
     if "matching" in kinds:  # the last: it narrows OpenCV to one thread

@@ -50,6 +50,20 @@ def test_matching_is_measured_at_every_speed(monkeypatch: pytest.MonkeyPatch) ->
     assert all(row.by_cpu and row.ratio > 0 and row.must is not None for row in rows)
 
 
+def test_two_threads_are_measured_against_one() -> None:
+    from speed_threads import thread_rows
+
+    threads = cv2.getNumThreads()
+    rows = list(thread_rows((64, 48), repeats=1))
+    assert [row.work.split(",")[0] for row in rows] == [
+        "maps of a frame set",
+        "one virtual view",
+        "decode a frame set",
+    ]
+    assert all(row.must == 0.59 and row.ratio > 0 for row in rows)
+    assert cv2.getNumThreads() == threads
+
+
 def test_the_chain_and_stock_code_run_on_the_same_pictures() -> None:
     import speed_encoding
     from speed_measures import material, stock_code
