@@ -228,7 +228,7 @@ def test_a_picture_of_another_size_is_an_error() -> None:
 
 def test_an_unknown_codec_is_named() -> None:
     header = StreamHeader(ARRAY, RANGE_PX, codec="vp8")
-    with pytest.raises(StreamError, match="found codec vp8, expected h264"):
+    with pytest.raises(StreamError, match="found codec vp8, expected one of h264"):
         pushed([Packet(HEADER_TRACK, 0, 0, True, header.to_json())])
 
 

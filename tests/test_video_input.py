@@ -123,7 +123,7 @@ def test_frames_are_counted_where_the_container_does_not_say(tmp_path: Path) -> 
 
 def test_grid_setting(tmp_path: Path) -> None:
     paths = write_grid(tmp_path, 4, 1)
-    with pytest.raises(SettingError, match=r"^grid: found nothing, expected RxC for 4 video files"):
+    with pytest.raises(SettingError, match=r"^grid: found nothing, expected RxC for 4 files in row order"):
         open_input(paths)
     with pytest.raises(SettingError, match=r"^grid: found 2x3, expected RxC with R\*C = 4"):
         open_input(paths, grid=(2, 3))
