@@ -87,6 +87,14 @@ def test_a_pole_holds_by_its_edges() -> None:
     assert bad[JointSettings().blind_cost] < 0.001
 
 
+def test_an_edge_that_runs_along_a_baseline_costs_less_where_many_disparities_are_possible() -> None:
+    settings = JointSettings(blind_cost=40)
+    assert settings.blind_cost_within((0, 16)) == settings.blind_cost_within((-9, 9)) == 40
+    costs = [settings.blind_cost_within((5.0, 5.0 + width)) for width in (30, 60, 160, 4000)]
+    assert costs == sorted(costs, reverse=True)
+    assert 40 > costs[0] > costs[2] > costs[3] == 0
+
+
 def stripes(shape: tuple[int, int], rho: float, *, horizontal: bool) -> dict[Position, FloatMap]:
     """Maps of a plane at 6 px that varies along one axis only."""
     array = linear_or_grid(*shape, 80, 80, rho=rho)

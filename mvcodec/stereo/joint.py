@@ -66,7 +66,8 @@ class Joint:
             return dict.fromkeys(array.real, flat)
         if fresh or self._gains.keys() != set(array.real):
             self._gains = self._measured_gains(array, pictures, range_px)
-        views = prepare_views(array, pictures, self._gains, cameras, self._census, self.settings.blind_cost)
+        blind_cost = self.settings.blind_cost_within(range_px)
+        views = prepare_views(array, pictures, self._gains, cameras, self._census, blind_cost)
         maps, valid = self._refined_maps(array, views, range_px, cameras)
         if self.settings.beyond_partners:
             extended = run_all(
@@ -98,7 +99,8 @@ class Joint:
         def matched(
             array: CameraArray, pictures: Mapping[Position, Picture], range_px: tuple[float, float]
         ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
-            views = prepare_views(array, pictures, ones, array.real, self._census, self.settings.blind_cost)
+            blind_cost = self.settings.blind_cost_within(range_px)
+            views = prepare_views(array, pictures, ones, array.real, self._census, blind_cost)
             return self._matched(array, views, range_px, array.real)
 
         return camera_gains(array, pictures, range_px, matched)

@@ -9,6 +9,9 @@ from mvcodec.errors import SettingError
 from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.scanlines import MAX_SUM, Penalties
 
+FEW_LEVELS = 24
+"""Disparities that the whole of `blind_cost` is for."""
+
 
 @dataclass(frozen=True, slots=True)
 class JointSettings:
@@ -26,7 +29,8 @@ class JointSettings:
     lone_cost: int = setting(12, "added where one partner alone must see the pixel", low=0, high=50)
     blind_cost: int = setting(
         40,
-        "added to partners in whose direction a picture has no detail, while it has across",
+        "added to partners in whose direction a picture has no detail, while it has across; less where many"
+        " disparities are possible",
         low=0,
         high=100,
     )
@@ -87,6 +91,15 @@ class JointSettings:
         room = MAX_SUM - max(self.jump, self.least_jump) - self.small_step
         if dearest > room:
             raise SettingError("JointSettings, the highest cost", dearest, f"at most {room}")
+
+    def blind_cost_within(self, range_px: tuple[float, float]) -> int:
+        """What `blind_cost` comes to in a search of this many px.
+
+        The partner across an edge is hidden beside it. Where it is, each further disparity is a further
+        chance of a match by accident, which must not outvote the blind partner that sees the pixel.
+        """
+        levels = range_px[1] - range_px[0] + 1
+        return round(self.blind_cost * min(1.0, FEW_LEVELS / levels))
 
     @property
     def matching_penalties(self) -> Penalties:
