@@ -139,3 +139,11 @@ def test_make_says_in_one_line_that_python_is_missing(tmp_path: Path, python: st
     assert len(done.stderr.splitlines()) == 1
     assert "mvcodec needs Python 3.11 or newer" in done.stderr
     assert not (tmp_path / ".venv").exists()
+
+
+@pytest.mark.slow
+def test_figures_that_everyone_can_make_are_made() -> None:
+    done = run("sample_figures.py")
+    assert done.returncode == 0, done.stderr
+    for name in ("layered", "dils", "joint", "sgbm", "realtime"):
+        assert f"| {name} |" in done.stdout
