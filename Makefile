@@ -39,12 +39,16 @@ demo: $(STAMP)
 # As the command line has it: adjusting rigs takes half as much again with two threads of BLAS.
 ONE_BLAS := OPENBLAS_NUM_THREADS=1
 
+# Files whose tests take longest begin first: a file stays with one process, and the last ones should be short.
+LONG_TESTS := $(sort $(wildcard tests/test_web_*.py tests/test_player_*.py))
+TESTS := $(LONG_TESTS) $(filter-out $(LONG_TESTS),$(sort $(wildcard tests/test_*.py)))
+
 # One core checks while the other compiles the kernels, where they have changed. A third process tests while
 # others wait for browsers, servers and live cameras.
 test: $(STAMP) $(WEB_STAMP)
 	@$(MAKE) --no-print-directory --jobs 2 lint kernels
 	cd web && $(NODE_ENV) node build.mjs --tests && $(NODE_ENV) node --test ../build/web-tests/*.test.mjs
-	$(ONE_BLAS) $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder -m "not slow"
+	$(ONE_BLAS) $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder -m "not slow" $(TESTS)
 
 test-slow: $(STAMP)
 	$(ONE_BLAS) $(BIN)/pytest -m slow

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from command_line import fails, succeeds
@@ -87,6 +88,21 @@ def test_two_eyes(coded: Path, tmp_path: Path) -> None:
     glasses = frames_of(tmp_path / "a.webp")
     assert len(glasses) == FRAMES
     assert glasses[0].shape == (HEIGHT, WIDTH, 3)
+
+
+def test_two_eyes_see_nothing_farther_apart_than_is_comfortable(tmp_path: Path) -> None:
+    # Measured as a viewer would: by matching one half of the picture against the other.
+    sample = Path(__file__).resolve().parent.parent / "samples" / "room_2x2.mcap"
+    succeeds("render", sample, tmp_path / "pair.png", "--style", "side-by-side", "--quiet")
+    pair = cv2.cvtColor(read_picture(tmp_path / "pair.png"), cv2.COLOR_RGB2GRAY)
+    width = pair.shape[1] // 2
+    reach = width // 10 // 16 * 16
+    matcher = cv2.StereoSGBM.create(-reach, 2 * reach, 5, 200, 800, uniquenessRatio=10, disp12MaxDiff=1)
+    parallax = matcher.compute(pair[:, :width].copy(), pair[:, width:].copy()) / 16
+    parallax = parallax[parallax >= -reach]  # matched at all
+    assert abs(np.median(parallax)) < 0.01 * width
+    assert 0.02 * width < np.percentile(parallax, 99.5) < 0.031 * width
+    assert np.percentile(parallax, 0.5) > -0.03 * width
 
 
 def test_mosaics(coded: Path, tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ from mvcodec.cli.progress import progress, tell_written
 from mvcodec.cli.safety import add_limits, add_on_error, limits_of
 from mvcodec.cli.standard_streams import OUTPUT_NAME, STANDARD, standard_input, standard_output
 from mvcodec.container import McapReader
-from mvcodec.container.chunked_file import CHUNK_MS
+from mvcodec.container.chunk_writing import CHUNK_MS
 from mvcodec.container.follow import FollowedFile
 from mvcodec.container.remote import is_url
 from mvcodec.decoding.decoder import Decoder

@@ -29,7 +29,7 @@ from mvcodec.cli.standard_streams import INPUT_NAME, STANDARD, standard_input, s
 from mvcodec.cli.tallied_writer import TalliedWriter
 from mvcodec.cli.time_options import timing_of
 from mvcodec.container import McapWriter
-from mvcodec.container.chunked_file import CHUNK_MS
+from mvcodec.container.chunk_writing import CHUNK_MS
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.decoding.decoded_source import is_own_file
 from mvcodec.encoding.encoder import Encoder, EncoderConfig

@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 
 from mvcodec.cli.setting_options import add_option
-from mvcodec.container.chunked_file import CHUNK_MS
+from mvcodec.container.chunk_writing import CHUNK_MS
 from mvcodec.container.limits import Limits
 from mvcodec.decoding.decoder import ON_ERROR, OnError
 from mvcodec.errors import SettingError

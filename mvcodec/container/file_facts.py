@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from mvcodec.container.chunks import OnDamage
+from mvcodec.container.chunk_reading import OnDamage
 from mvcodec.container.reader import McapReader
 from mvcodec.enhancement import LAYER_TRACK, EnhancementHeader
 from mvcodec.errors import StreamError

@@ -12,7 +12,7 @@ from mcap_protobuf.schema import build_file_descriptor_set
 from numpy.typing import NDArray
 
 from mvcodec.closing import Closing
-from mvcodec.container.chunked_file import ChunkedFile
+from mvcodec.container.chunk_writing import ChunkedFile
 from mvcodec.container.schemas import RIG_FRAME
 
 POINTS_TOPIC = "/points"

@@ -14,7 +14,7 @@ from mcap.records import Message
 
 from mvcodec.closing import Closing
 from mvcodec.container import schemas
-from mvcodec.container.chunks import EXPECTED, ChunkReader, OnDamage, TopicMessage
+from mvcodec.container.chunk_reading import EXPECTED, ChunkReader, OnDamage, TopicMessage
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.remote import is_url, open_url

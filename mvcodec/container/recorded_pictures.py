@@ -8,7 +8,7 @@ from typing import BinaryIO, Literal
 
 from mcap.records import Message
 
-from mvcodec.container.chunks import ChunkReader, OnDamage, TopicMessage
+from mvcodec.container.chunk_reading import ChunkReader, OnDamage, TopicMessage
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.message_schema import DamagedMessage
 from mvcodec.container.picture_schemas import (

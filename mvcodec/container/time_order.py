@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from mcap.records import Message
 
-from mvcodec.container.chunks import ChunkReader, TopicMessage
+from mvcodec.container.chunk_reading import ChunkReader, TopicMessage
 
 _RUN = 5
 """Messages that two stretches of a topic must have at the same times before its clock was set back."""

@@ -9,7 +9,7 @@ from typing import BinaryIO
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.closing import Closing
 from mvcodec.container import schemas
-from mvcodec.container.chunked_file import CHUNK_MS, ChunkedFile
+from mvcodec.container.chunk_writing import CHUNK_MS, ChunkedFile
 from mvcodec.video.codecs import foxglove_name
 
 

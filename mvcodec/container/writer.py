@@ -12,7 +12,7 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 
 from mvcodec.closing import Closing
 from mvcodec.container import schemas
-from mvcodec.container.chunked_file import CHUNK_MS, ChunkedFile, MessageListener
+from mvcodec.container.chunk_writing import CHUNK_MS, ChunkedFile, MessageListener
 from mvcodec.container.declared import METADATA_NAME, TOPICS_KEY
 from mvcodec.enhancement import EnhancementHeader
 from mvcodec.errors import StreamClosed
