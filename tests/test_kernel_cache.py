@@ -37,11 +37,11 @@ def installed(tmp_path: Path) -> Path:
     return kernels
 
 
-def run(installed: Path, **environment: str) -> list[str]:
-    """Whether it compiled, the result and the folder of the cache, from a process of its own."""
+def run(installed: Path, program: str = REPORT, **environment: str) -> list[str]:
+    """What it prints (whether it compiled, the result and the cache's folder), from a process of its own."""
     variables = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
     done = subprocess.run(
-        [sys.executable, "-c", REPORT],
+        [sys.executable, "-c", program],
         env=variables | {"PYTHONPATH": str(installed.parents[1])} | environment,
         capture_output=True,
         text=True,
@@ -100,11 +100,27 @@ def test_nothing_else_of_numba_is_moved() -> None:
     assert KernelCode.from_function(other, __file__) is None  # type: ignore[arg-type]
 
 
-def test_kernels_load_without_scipy_and_other_programs_still_find_its_blas() -> None:
-    program = (
-        "import sys\nimport mvcodec.kernels\nprint('scipy.linalg' in sys.modules)\n"
-        "from numba.np import arraymath, linalg\nprint(arraymath._HAVE_BLAS)\n"
-        "linalg.ensure_blas()\nprint('scipy.linalg' in sys.modules)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["False", "True", "True"]
+STATE = (
+    "import sys\nfrom mvcodec.kernels.caller import doubled\n"
+    "def state(): print(*(name in sys.modules for name in ('numba.np.arrayobj', 'scipy.linalg')))\n"
+    "doubled(21)\nstate()\n"
+    "from numba.np import arraymath, linalg\nprint(arraymath._HAVE_BLAS)\nlinalg.ensure_blas()\nstate()\n"
+)
+
+
+def test_what_compiling_needs_is_loaded_for_that_alone_and_scipy_for_other_programs_alone(
+    installed: Path,
+) -> None:
+    pytest.importorskip("scipy")
+    assert run(installed, STATE)[:2] == ["True", "False"]
+    assert run(installed, STATE) == ["False", "False", "True", "True", "True"]
+
+
+def test_a_kernel_can_be_compiled_behind_one_whose_code_was_kept(installed: Path) -> None:
+    both = "from mvcodec.kernels.caller import doubled\nprint(doubled(21), doubled(1.5))\n"
+    run(installed)
+    assert run(installed, both) == ["42", "3.0"]
+    (installed / "caller.py").write_text(CALLER.replace("* x", "* x + np.zeros(3).sum()"))
+    (installed / "caller.py").write_text("import numpy as np\n" + (installed / "caller.py").read_text())
+    assert run(installed, both) == ["42.0", "3.0"]
+    assert run(installed, both) == ["42.0", "3.0"]

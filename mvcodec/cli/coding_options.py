@@ -100,26 +100,35 @@ def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: 
 
 
 def find_range(
-    source: ArraySource, chosen: range, option: tuple[float, float] | str | None, given: bool = False
+    source: ArraySource,
+    chosen: range,
+    option: tuple[float, float] | str | None,
+    given: bool = False,
+    first: FrameSet | None = None,
 ) -> tuple[float, float]:
     """The range of disparities, px, that ``--disparity-range`` asks for, estimated where it gives none.
 
     Args:
         given: the maps that the input has will be coded: their own range counts.
+        first: the first frame set of those chosen, where it has been read already.
     """
     if isinstance(option, tuple):
         return option
+    samples = _samples(source, chosen, first)
     if given:
-        return given_range(_samples(source, chosen))
+        return given_range(samples)
     hint = None if option == "auto" else source.array.disparity_hint_px
-    return estimate_range(source.array, _samples(source, chosen), hint)
+    return estimate_range(source.array, samples, hint)
 
 
-def _samples(source: ArraySource, chosen: range) -> list[FrameSet]:
+def _samples(source: ArraySource, chosen: range, first: FrameSet | None) -> list[FrameSet]:
     """Frame sets spread over those chosen: few of a short time, in which scenes stay as they are."""
     seconds = (len(chosen) - 1) / source.array.fps
     count = min(MAX_FRAMES, len(chosen), 1 + round(seconds / APART_S))
     numbers = {chosen[index * (len(chosen) - 1) // max(count - 1, 1)] for index in range(count)}
-    return [
-        frame_set for number in sorted(numbers) for frame_set in source.frame_sets(slice(number, number + 1))
-    ]
+    read = [] if first is None else [first]
+    if read:
+        numbers.discard(chosen[0])
+    for number in sorted(numbers):
+        read += source.frame_sets(slice(number, number + 1))
+    return read

@@ -156,7 +156,7 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
     source: ArraySource = _open(arguments)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     load_kernels_beside()
-    source = rectified_source(source, chosen, arguments)
+    source, first = rectified_source(source, chosen, arguments)
     array = source.array
     if arguments.calibration is not None:
         array = replace(array, calibration=read_calibration(arguments.calibration))
@@ -175,7 +175,8 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
         range_px = source.disparity_range_px
     else:
         with stage("find the range of disparities", quiet=arguments.quiet):
-            range_px = find_range(source, chosen, arguments.disparity_range_px, given)
+            range_px = find_range(source, chosen, arguments.disparity_range_px, given, first)
+    del first  # its memory is as large as what is coded next
     if arguments.dry_run:
         print(plan(array, config, chosen, range_px))
         return None

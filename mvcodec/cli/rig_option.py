@@ -40,8 +40,10 @@ def add_rig(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def rectified_source(source: ArraySource, chosen: range, arguments: argparse.Namespace) -> ArraySource:
-    """The input itself, or rectified as ``--rig`` says; checked by a look at its first frame set."""
+def rectified_source(
+    source: ArraySource, chosen: range, arguments: argparse.Namespace
+) -> tuple[ArraySource, FrameSet]:
+    """The input itself, or rectified as ``--rig`` says; and its first frame set, which was looked at."""
     if arguments.rig is not None:
         tell_delays(source, chosen, arguments, strict=arguments.strict)
         if arguments.rig == AUTO:
@@ -49,7 +51,7 @@ def rectified_source(source: ArraySource, chosen: range, arguments: argparse.Nam
         source = RectifiedSource(source, Rectifier(_rig_of(source, chosen, arguments)))
     first = next(iter(source.frame_sets(slice(chosen.start, chosen.start + 1))))
     look(source.array, first.pictures, source.name, strict=arguments.strict)
-    return source
+    return source, first
 
 
 def tell_order(source: ArraySource, chosen: range, *, strict: bool = False) -> None:

@@ -1,10 +1,9 @@
 """Compiled loops: the only modules that import Numba, each imported where it is first needed."""
 
-from mvcodec.kernels.compiled_code import keep_compiled_code, load_without_scipy, on_first_compilation
+from mvcodec.kernels.compiled_code import keep_compiled_code, on_first_compilation
 
 # Others take it from here: two threads of which one asks for the package and one for this module of it
 # would wait for each other.
 __all__ = ["on_first_compilation"]
 
-load_without_scipy()
 keep_compiled_code()

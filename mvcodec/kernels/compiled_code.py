@@ -14,7 +14,9 @@ from typing import Any
 
 from numba import config
 from numba.core import event
-from numba.core.caching import CacheImpl
+from numba.core.caching import Cache, CacheImpl
+from numba.core.cpu import CPUContext
+from numba.core.runtime.nrt import rtsys
 from numba.misc.appdirs import AppDirs
 
 PACKAGE = "mvcodec.kernels"
@@ -95,24 +97,47 @@ def _is_writable(path: Path) -> bool:
     return True
 
 
-def load_without_scipy() -> None:
-    """Load Numba's linear algebra, which no kernel needs, without SciPy, which takes a third of a second.
+class _BeforeCompiling(event.Listener):
+    """Loads Numba's linear algebra, which no kernel needs, without SciPy, which takes a third of a second.
 
     Numba asks whether SciPy is there as it loads, and again whenever something needs it: only the first is
     left out, so that other programs' functions find it.
     """
-    from numba.np import linalg
 
-    asks, linalg.ensure_blas = linalg.ensure_blas, lambda: None
-    try:
-        importlib.import_module("numba.np.arraymath")
-    finally:
-        linalg.ensure_blas = asks
+    def on_start(self, _event: Any) -> None:
+        from numba.np import linalg
+
+        asks, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+        try:
+            importlib.import_module("numba.np.arraymath")
+        finally:
+            linalg.ensure_blas = asks
+
+    def on_end(self, _event: Any) -> None:
+        pass
+
+
+def _load_overload(cache: Cache, signature: Any, context: CPUContext) -> Any:
+    """Load a function's kept code; a kernel's without all that Numba knows for compiling.
+
+    That takes several times as long to load, and Numba goes through it again for each function. Where code
+    has to be compiled, it is loaded then.
+    """
+    if not isinstance(cache._impl.locator, KernelCode):
+        return _load_any_overload(cache, signature, context)
+    rtsys.initialize(context)  # memory of kernels' own arrays
+    with cache._guard_against_spurious_io_errors():
+        return cache._load_overload(signature, context)
+
+
+_load_any_overload = Cache.load_overload
 
 
 def keep_compiled_code() -> None:
-    """Have Numba ask `KernelCode` first."""
+    """Have Numba keep kernels' compiled code where `KernelCode` says, and load no more than that of it."""
     CacheImpl._locator_classes.insert(0, KernelCode)  # type: ignore[arg-type]
+    Cache.load_overload = _load_overload  # type: ignore[method-assign]
+    event.register(COMPILING, _BeforeCompiling())
 
 
 class _Once(event.Listener):
