@@ -1,4 +1,4 @@
-"""How both pages keep up in one browser: pictures a second that it draws, or that the server draws.
+"""How the page keeps up in a browser: pictures a second that it draws itself, or that a server draws.
 
     python benchmarks/web_playback.py FILE.mcap [--seconds 8] [--rounds 3]
 
@@ -31,28 +31,20 @@ MOVES_A_SECOND = 60
 WARM_UP_S = 4.0
 TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 
-COUNT = {
-    "web": """async () => {
-        const player = document.querySelector("mvcodec-player");
-        await player.ready;
-        const canvas = player.shadowRoot.querySelector("canvas.picture");
-        window.tally = { pictures: 0, widths: 0 };
-        player.addEventListener("frame", () => {
-            window.tally.pictures++;
-            window.tally.widths += canvas.width;
-        });
-        player.play();
-    }""",
-    "server": """() => {
-        window.tally = { pictures: 0, widths: 0 };
-        const body = document.body;
-        new MutationObserver(() => {
-            window.tally.pictures++;
-            window.tally.widths += Number(body.dataset.scale);
-        }).observe(body, { attributeFilter: ["data-row", "data-frame"] });
-    }""",
-}
+COUNT = """async () => {
+    const player = document.querySelector("mvcodec-player");
+    await player.ready;
+    const canvas = player.shadowRoot.querySelector("canvas.picture");
+    window.tally = { pictures: 0, widths: 0 };
+    player.addEventListener("frame", () => {
+        window.tally.pictures++;
+        window.tally.widths += canvas.width;
+    });
+    player.play();
+}"""
 """Counts each picture on the screen, and adds up how wide they were."""
+
+RENDERERS = ("web", "server")
 
 
 @contextmanager
@@ -75,11 +67,7 @@ def measure(browser: Browser, path: Path, renderer: str, seconds: float) -> str:
         page = browser.new_page(viewport=SCREEN, reduced_motion="reduce")
         page.set_default_timeout(0)  # kernels may have to be compiled first
         page.goto(url)
-        if renderer == "server":
-            page.wait_for_selector("body[data-frame]")
-        page.evaluate(COUNT[renderer])
-        if renderer == "server":
-            page.keyboard.press(" ")
+        page.evaluate(COUNT)
         page.mouse.move(SCREEN["width"] / 2, SCREEN["height"] / 2)
         page.mouse.down()
         drag(page, WARM_UP_S)
@@ -90,7 +78,7 @@ def measure(browser: Browser, path: Path, renderer: str, seconds: float) -> str:
         after = tally(page)
         page.close()
     pictures, widths = (after[name] - before[name] for name in ("pictures", "widths"))
-    sides = widths / pictures / (page_width(path) if renderer == "web" else 1)
+    sides = widths / pictures / picture_width(path)
     others = max(0.0, busy_s - own_s) / all_s
     return (
         f"{renderer:6} {pictures / took_s:5.1f} pictures/s, {1000 * own_s / pictures:5.1f} ms CPU each, "
@@ -112,7 +100,7 @@ def tally(page: Page) -> dict[str, float]:
     return found
 
 
-def page_width(path: Path) -> float:
+def picture_width(path: Path) -> float:
     from mvcodec.decoding.decoder import Decoder
 
     with Decoder.open(path) as decoder:
@@ -160,7 +148,7 @@ def main() -> int:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program, args=list(ARGUMENTS))
         for _ in range(arguments.rounds):
-            for renderer in COUNT:
+            for renderer in RENDERERS:
                 print(measure(browser, arguments.file, renderer, arguments.seconds), flush=True)
         browser.close()
     return 0

@@ -11,6 +11,7 @@ from playwright.sync_api import Browser, Page
 pytest_plugins = ("chromium", "player_fixtures")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def page(chromium: Browser) -> Iterator[Page]:
+    """One for all tests of a file: to start a page costs more than most of them."""
     yield from watched_page(chromium, 1280, 720)

@@ -6,10 +6,11 @@ import base64
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from player_files import SYNTHESIZER, Running, decode_picture
-from playwright.sync_api import Browser, FloatRect, Page
+from player_files import SYNTHESIZER, Running
+from playwright.sync_api import Browser, Page
 
 from mvcodec.array import Viewpoint
 from mvcodec.decoding.decoder import Decoder
@@ -33,6 +34,7 @@ FIRST_PICTURE_MS = 240_000
 """Kernels may have to be compiled first, on a machine that does much else."""
 SAME_DB = 33
 """A picture that came as JPEG has more than this against its own source."""
+PLAYER = "document.querySelector('mvcodec-player')"
 
 
 def watched_page(browser: Browser, width: int, height: int) -> Iterator[Page]:
@@ -51,19 +53,72 @@ def is_here(url: str) -> bool:
 
 
 def show(page: Page, server: Running, link: str = "") -> None:
+    """Go to a player's page; its first picture is on the screen then."""
     page.goto(server.url + link)
-    page.wait_for_selector("body[data-frame]", timeout=FIRST_PICTURE_MS)
+    page.wait_for_function(f"() => {PLAYER}.shown !== undefined", timeout=FIRST_PICTURE_MS)
 
 
-def shows(page: Page, **facts: object) -> None:
-    """Wait until the picture on the screen is one with these facts (frame, row, col, look)."""
-    page.wait_for_selector("body" + "".join(f"[data-{name}='{value}']" for name, value in facts.items()))
+def shown(page: Page) -> dict[str, Any]:
+    found: dict[str, Any] = page.evaluate(f"{PLAYER}.shown")
+    return found
 
 
-def pixels(page: Page) -> Picture:
-    """What is on the canvas, in the file's own pixels."""
-    url = page.evaluate("document.querySelector('canvas').toDataURL('image/png')")
-    return decode_picture(np.frombuffer(base64.b64decode(url.split(",")[1]), np.uint8))
+def waits_for(page: Page, condition: str) -> None:
+    """Wait until something holds of what is `shown`."""
+    page.wait_for_function(f"() => {{ const shown = {PLAYER}.shown; return {condition}; }}")
+
+
+def settled(page: Page) -> None:
+    """Wait until what is asked for is on the screen with all detail."""
+    page.evaluate(f"{PLAYER}.settled()")
+
+
+def comes_to(page: Page, frame: int, row: float, col: float) -> None:
+    """Wait until the whole picture of a viewpoint is on the screen; rows and columns to 1e-6 of a step."""
+    near = " && ".join(
+        f"Math.abs(shown.view.{name} - {at}) < 1e-6" for name, at in (("row", row), ("col", col))
+    )
+    waits_for(page, f"shown.frame === {frame} && {near}")
+    settled(page)
+
+
+def pixels_of(page: Page, selector: str = "mvcodec-player", fine: bool = True) -> Picture:
+    """What the player's `pixels()` gives, as RGB: as the picture stands or, not `fine`, as it moves."""
+    width, height, data = page.evaluate(
+        """([selector, fine]) => {
+            const { width, height, data } = document.querySelector(selector).pixels(fine);
+            let text = "";
+            for (let i = 0; i < data.length; i += 32768) {
+                text += String.fromCharCode(...data.subarray(i, i + 32768));
+            }
+            return [width, height, btoa(text)];
+        }""",
+        [selector, fine],
+    )
+    return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4)[..., :3]
+
+
+def toggle_menu(page: Page) -> None:
+    page.get_by_label("More").dispatch_event("click")  # the controls may have hidden by now
+
+
+def set_slider(page: Page, label: str, value: str) -> None:
+    page.get_by_label(label, exact=True).fill(value)
+
+
+def drop(page: Page, file: Path) -> None:
+    """Drop a file on the player; it is shown then."""
+    page.evaluate(
+        """(bytes) => {
+            const transfer = new DataTransfer();
+            transfer.items.add(new File([new Uint8Array(bytes)], "other.mcap"));
+            const player = document.querySelector("mvcodec-player");
+            const about = { dataTransfer: transfer, bubbles: true, cancelable: true };
+            player.dispatchEvent(new DragEvent("drop", about));
+            return player.ready;
+        }""",
+        list(file.read_bytes()),
+    )
 
 
 def rendered(file: Path, frame: int, row: float, col: float) -> Picture:
@@ -73,44 +128,6 @@ def rendered(file: Path, frame: int, row: float, col: float) -> Picture:
     return make_synthesizer(SYNTHESIZER).render(decoded, Viewpoint(row, col)).pixels
 
 
-def box_of(page: Page, selector: str) -> FloatRect:
-    box = page.locator(selector).bounding_box()
-    assert box is not None, f"{selector} is not visible"
-    return box
-
-
-def on_screen(page: Page) -> tuple[int, float, float]:
-    facts = page.evaluate("({...document.body.dataset})")
-    return int(facts["frame"]), float(facts["row"]), float(facts["col"])
-
-
 def screenshot(page: Page, name: str) -> None:
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=SCREENSHOTS / f"{name}.png")
-
-
-def comes_to(page: Page, frame: int, row: float, col: float) -> None:
-    """Wait until the whole picture of a viewpoint is on the screen; rows and columns to 1e-6 of a step."""
-    page.wait_for_function(
-        """([frame, row, col]) => {
-            const shown = document.body.dataset;
-            const near = (text, value) => Math.abs(Number(text) - value) < 1e-6;
-            return Number(shown.frame) === frame && near(shown.row, row) && near(shown.col, col)
-                && Number(shown.scale) === 1 && shown.quick === 'false';
-        }""",
-        arg=[frame, row, col],
-    )
-
-
-def stands_still(page: Page, for_ms: float) -> None:
-    """Wait until the picture on the screen has not changed for so long (a picture may still be under way)."""
-    page.evaluate("document.body.dataset.stillSince = performance.now()")
-    page.wait_for_function(
-        """(forMs) => {
-            const body = document.body.dataset;
-            const shown = [body.frame, body.row, body.col].join();
-            if (shown !== body.stillShows) [body.stillShows, body.stillSince] = [shown, performance.now()];
-            return performance.now() - body.stillSince > forMs;
-        }""",
-        arg=for_ms,
-    )

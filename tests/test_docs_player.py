@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS
+from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS, pixels_of
 from playwright.sync_api import Page, expect
-from web_fixtures import Site, pixels_of, serve_folder
+from web_fixtures import Site, serve_folder
 
 pytestmark = [pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM), pytest.mark.slow]
 pytest_plugins = ("web_fixtures",)

@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM
+from browser_page import CHROMIUM, NO_CHROMIUM, pixels_of
 from command_line import fails, succeeds
 from playwright.sync_api import Page
-from web_fixtures import Site, pixels_of, serve_folder
+from web_fixtures import Site, serve_folder
 
 import mvcodec
 

@@ -10,7 +10,7 @@ from plane_scene import Plane, PlaneScene, grid
 from mvcodec.array import Calibration, CameraArray, Viewpoint
 from mvcodec.evaluation.metrics import psnr
 from mvcodec.player.draft import BUDGET_S, QUICKER, SMALLER, WHOLE, WINDOW, Level, Pace, in_full_px, shrink
-from mvcodec.player.messages import Measure, Message, Move, Play, Ready, Seek
+from mvcodec.player.messages import Message, Move, Play, Ready, Seek, Show
 from mvcodec.player.session import MOVING_S, Session
 from mvcodec.synthesis.linear import Linear, LinearSettings
 
@@ -112,9 +112,9 @@ def test_playing_uses_drafts_and_a_picture_that_stands_is_whole() -> None:
     session = slow_session(Play(True))
     levels = [level_at(session, number / 10) for number in range(WINDOW + 1)]
     assert levels == [WHOLE] * WINDOW + [SMALLER[-1]]
-    session.apply(Measure(True), 0.7)
+    session.apply(Show("difference"), 0.7)
     assert level_at(session, 0.7) == WHOLE
-    session.apply(Measure(False), 0.8)
+    session.apply(Show("picture"), 0.8)
     assert level_at(session, 0.8) == SMALLER[-1]
     session.apply(Play(False), 0.9)
     assert level_at(session, 0.9) == WHOLE

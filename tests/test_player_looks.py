@@ -15,7 +15,7 @@ from mvcodec.array import Viewpoint
 from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.output import stereoscopic
 from mvcodec.player import overlays
-from mvcodec.player.looks import LOOKS
+from mvcodec.player.looks import EYES
 from mvcodec.synthesis.linear import Linear
 
 ARRAY = grid(3, 5, 96, 64, step=2)
@@ -23,10 +23,10 @@ SCENE = PlaneScene(ARRAY, 4, (Plane(12, (20, 40, 50, 80)),))
 PLACE = Viewpoint(1.0, 1.0)
 
 
-def show(look: str, viewpoint: Viewpoint = PLACE, eyes: float = 1.0) -> tuple[Picture, dict[str, object]]:
+def seen_by(eyes: str, viewpoint: Viewpoint, steps: float) -> Picture:
     decoded = SCENE.decoded()
-    views = [Linear().render(decoded, place) for place in LOOKS[look].place(ARRAY, viewpoint, eyes)]
-    return LOOKS[look].compose(decoded, views)
+    views = [Linear().render(decoded, place) for place in EYES[eyes].place(ARRAY, viewpoint, steps)]
+    return EYES[eyes].combine([view.pixels for view in views])
 
 
 def rendered(viewpoint: Viewpoint = PLACE) -> tuple[DecodedSet, RenderedView]:
@@ -43,7 +43,7 @@ def test_disparity_colours_are_those_of_the_scale() -> None:
         np.linspace(low, high, view.pixels.shape[1], dtype=np.float32)[None].repeat(4, 0),
         view.seen_by,
     )
-    picture, legend = overlays.disparity(decoded, [flat])
+    picture, legend = overlays.disparity(decoded, flat)
     colours = ["#{:02x}{:02x}{:02x}".format(*picture[0, x]) for x in (0, -1)]
     assert colours == [legend["colours"][0], legend["colours"][-1]]
     assert (legend["low"], legend["high"]) == (low, high)
@@ -53,7 +53,7 @@ def test_disparity_colours_are_those_of_the_scale() -> None:
 def test_layers_have_a_colour_each_and_shares_of_the_picture() -> None:
     decoded, view = rendered(Viewpoint(0, 0))
     view = RenderedView(view.viewpoint, np.full_like(view.pixels, 90), view.disparity_px, view.seen_by)
-    picture, legend = overlays.layers(decoded, [view])
+    picture, legend = overlays.layers(decoded, view)
     near = view.disparity_px == 12
     assert len(np.unique(picture[near], axis=0)) == 1
     assert len(np.unique(picture[~near], axis=0)) == 1
@@ -71,7 +71,7 @@ def test_provenance_counts_cameras() -> None:
     for count in range(5):
         seen[:, count::5] = count
     _, legend = overlays.provenance(
-        decoded, [RenderedView(view.viewpoint, view.pixels, view.disparity_px, seen)]
+        decoded, RenderedView(view.viewpoint, view.pixels, view.disparity_px, seen)
     )
     texts = [item["text"] for item in legend["items"]]
     assert texts == ["filled, no camera", "1 camera", "2 cameras", "3 cameras", "4 cameras"]
@@ -87,12 +87,12 @@ def test_difference_is_to_the_original_in_levels() -> None:
 
 def test_disagreement_is_how_much_the_warped_cameras_differ() -> None:
     decoded, view = rendered()
-    same, legend = overlays.disagreement(decoded, [view])
+    same, legend = overlays.disagreement(decoded, view)
     assert "Disagreement" in legend["text"]
     camera = decoded.array.real[0]
     brighter = np.minimum(decoded.pictures[camera].astype(int) + 20, 255).astype(np.uint8)
     pictures = {**decoded.pictures, camera: brighter}
-    spoiled, _ = overlays.disagreement(replace(decoded, pictures=pictures), [view])
+    spoiled, _ = overlays.disagreement(replace(decoded, pictures=pictures), view)
     assert np.median(same) < 20
     assert np.median(spoiled) > 50
 
@@ -127,10 +127,9 @@ def test_each_eye_sees_its_own_picture_through_the_glasses() -> None:
 
 def test_side_by_side_and_nine_views_lie_in_order() -> None:
     decoded = SCENE.decoded()
-    pair, legend = show("side-by-side", Viewpoint(0, 2), 4.0)
+    pair = seen_by("side by side", Viewpoint(0, 2), 4.0)
     np.testing.assert_array_equal(pair, np.hstack([decoded.pictures[0, 0], decoded.pictures[0, 4]]))
-    assert legend["text"] == "Left and right eye at columns 0.00 to 4.00, 4.00 apart"
-    sheet, _ = show("mosaic", Viewpoint(0, 2), 0.5)
+    sheet = seen_by("nine", Viewpoint(0, 2), 0.5)
     height, width = ARRAY.height, ARRAY.width
     np.testing.assert_array_equal(sheet[:height, :width], decoded.pictures[0, 0])
     np.testing.assert_array_equal(sheet[height : 2 * height, width : 2 * width], decoded.pictures[0, 2])

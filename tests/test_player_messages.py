@@ -14,8 +14,8 @@ from mvcodec.player.messages import (
     MAX_MESSAGE_BYTES,
     Dolly,
     Eyes,
+    Focus,
     Loop,
-    Measure,
     Message,
     Move,
     Play,
@@ -39,11 +39,12 @@ LEGAL: list[tuple[str, Message]] = [
     ('{"type": "speed", "factor": 0.25}', Speed(0.25)),
     ('{"type": "loop", "loop": false}', Loop(False)),
     ('{"type": "show", "look": "layers"}', Show("layers")),
-    ('{"type": "eyes", "steps": 0.5}', Eyes(0.5)),
+    ('{"type": "eyes", "mode": "anaglyph", "steps": 0.5}', Eyes("anaglyph", 0.5)),
+    ('{"type": "focus", "px": 7.5}', Focus(7.5)),
+    ('{"type": "focus", "px": null}', Focus(None)),
     ('{"type": "dolly", "share": 0.2}', Dolly(0.2)),
     ('{"type": "wipe", "share": 1}', Wipe(1.0)),
     ('{"type": "probe", "x": 0, "y": 1}', Probe(0.0, 1.0)),
-    ('{"type": "measure", "measure": true}', Measure(True)),
     ('{"type": "shown", "picture": 3}', Shown(3)),
 ]
 
@@ -53,7 +54,9 @@ json_values = st.recursive(
     max_leaves=6,
 )
 kinds = st.sampled_from([json.loads(text)["type"] for text, _ in LEGAL])
-names = st.sampled_from(["row", "col", "frame", "playing", "factor", "look", "steps", "picture", "frames"])
+names = st.sampled_from(
+    ["row", "col", "frame", "playing", "factor", "look", "mode", "px", "steps", "picture", "frames"]
+)
 
 
 @pytest.mark.parametrize(("text", "message"), LEGAL)
@@ -105,6 +108,8 @@ def test_places_come_through_unchanged(row: float, col: float) -> None:
         '{"type": "play", "playing": 1}',
         '{"type": "speed", "factor": 0}',
         '{"type": "show", "look": "nothing"}',
+        '{"type": "eyes", "mode": "three", "steps": 1}',
+        '{"type": "focus", "px": "near"}',
         '{"type": "quit"}',
         '{"type": ["move"]}',
         "[" * 900,

@@ -8,13 +8,26 @@ import ipaddress
 import json
 import random
 import sys
+import urllib.request
 from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import cv2
+import numpy as np
 import pytest
 from command_line import fails
-from player_files import FRAMES, GOP, SYNTHESIZER, Running, Viewer, damage, playing, write_original
+from player_files import (
+    FRAMES,
+    GOP,
+    SYNTHESIZER,
+    Running,
+    Viewer,
+    damage,
+    decode_picture,
+    playing,
+    write_original,
+)
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from mvcodec.array import Viewpoint
@@ -25,6 +38,7 @@ from mvcodec.depth import depth_m
 from mvcodec.errors import MissingExtra
 from mvcodec.evaluation.metrics import psnr, ssim
 from mvcodec.player.access import AccessRules, is_loopback
+from mvcodec.player.looks import LOOKS
 from mvcodec.player.messages import MAX_MESSAGE_BYTES
 from mvcodec.player.serving import page_url
 from mvcodec.synthesis.synthesizers import make_synthesizer
@@ -49,8 +63,8 @@ def test_serves_its_page_and_nothing_else(server: Running) -> None:
     page = get(server, "/")
     assert page.status == 200
     assert "default-src 'none'" in (page.getheader("Content-Security-Policy") or "")
-    assert get(server, "/main.js").status == 200
-    for path in ("/../server.py", "/%2e%2e/server.py", "/page/", "/room.mcap", "//etc/passwd", "/main.js/"):
+    assert get(server, "/player.js").status == 200
+    for path in ("/../server.py", "/%2e%2e/server.py", "/page/", "/room.mcap", "//etc/passwd", "/player.js/"):
         assert get(server, path).status in (307, 404), path
 
 
@@ -95,9 +109,10 @@ def test_loopback(host: str) -> None:
 def test_greets_with_the_facts(server: Running) -> None:
     with Viewer(server) as viewer:
         hello = viewer.hello
-    assert (hello["rows"], hello["cols"], hello["frames"]) == (3, 3, FRAMES)
-    assert hello["real"] == [[0, 0], [0, 2], [2, 0], [2, 2]]
-    assert hello["measurable"] is True
+    assert (hello["rows"], hello["cols"]) == (3, 3)
+    assert (hello["real_rows"], hello["real_cols"]) == ([0, 2], [0, 2])
+    assert hello["looks"] == list(LOOKS)
+    assert hello["times_s"] == pytest.approx([number / 24 for number in range(FRAMES)])
     assert hello["cut_off"] is None
 
 
@@ -146,13 +161,29 @@ def test_measures_against_the_original(server: Running, file: Path, original: Pa
     with Viewer(server) as viewer:
         for kind, fields in (("seek", {"frame": 5}), ("move", {"row": 1, "col": 0})):
             viewer.say(kind, **fields)
-        viewer.say("measure", measure=True)
+        viewer.say("show", look="difference")
         viewer.say("ready")
         quality = viewer.next_picture().facts["quality"]
         assert quality["psnr_db"] == pytest.approx(psnr(frames.pictures[1, 0], rendered))
         assert quality["ssim"] == pytest.approx(ssim(frames.pictures[1, 0], rendered))
-        viewer.say("move", row=1, col=0.5)
-        assert "no original" in viewer.next_picture().facts["quality"]["reason"]
+
+
+def test_hands_out_small_pictures_of_the_nearest_camera_at_the_keyframe_before(
+    server: Running, file: Path
+) -> None:
+    with Decoder.open(file, slice(GOP, GOP + 1)) as decoder:
+        (decoded,) = decoder
+    with urllib.request.urlopen(f"{server.url}thumbnail/{GOP + 2}?row=0.3&col=1.4") as answer:
+        found = decode_picture(np.frombuffer(answer.read(), np.uint8))
+    whole = decoded.pictures[0, 2]
+    expected = cv2.resize(
+        whole, (160, round(160 * whole.shape[0] / whole.shape[1])), interpolation=cv2.INTER_AREA
+    )
+    assert psnr(np.asarray(expected, np.uint8), found) > 33
+    assert get(server, f"/thumbnail/{FRAMES}?row=0&col=0").status == 404
+    for place in ("", "?row=0", "?row=x&col=0"):
+        assert get(server, f"/thumbnail/0{place}").status == 400
+    assert get(server, "/thumbnail/0?row=0&col=0", "evil.example").status == 403
 
 
 def test_malformed_messages_close_their_connection_and_no_other(server: Running) -> None:

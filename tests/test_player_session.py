@@ -11,8 +11,8 @@ from mvcodec.player.clock import MAX_STALL_S, PlayClock
 from mvcodec.player.messages import (
     Dolly,
     Eyes,
+    Focus,
     Loop,
-    Measure,
     Message,
     Move,
     Play,
@@ -65,8 +65,15 @@ def test_the_latest_viewpoint_wins() -> None:
 def test_a_view_from_ahead_is_none_where_it_is_compared() -> None:
     session = ready(Dolly(0.5))
     assert request(session).dolly == 0.5
-    session.apply(Measure(True), 0.0)
+    session.apply(Show("disagreement"), 0.0)
     assert request(session).dolly == 0
+
+
+def test_what_is_compared_with_an_original_is_one_sharp_view_from_the_nearest_place() -> None:
+    session = ready(Move(Viewpoint(0.6, 2.5)), Eyes("anaglyph", 1.0), Focus(3.0), Dolly(0.5))
+    assert request(session).viewpoint == Viewpoint(0.6, 2.5)
+    session.apply(Show("difference"), 0.0)
+    assert request(session) == PictureRequest(0, Viewpoint(1.0, 3.0), "difference")
 
 
 @given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))
@@ -107,12 +114,12 @@ def test_seeks_end_at_the_ends() -> None:
     assert request(session).frame == 0
 
 
-def test_eyes_matter_to_stereo_only() -> None:
+def test_the_distance_of_eyes_matters_to_several_views_only() -> None:
     session = ready()
     request(session)
-    session.apply(Eyes(1.0), 0.0)
+    session.apply(Eyes("one", 1.0), 0.0)
     assert session.next_request(0.0) is None
-    session.apply(Show("anaglyph"), 0.0)
+    session.apply(Eyes("anaglyph", 1.0), 0.0)
     assert request(session).eye_steps == 1.0
 
 

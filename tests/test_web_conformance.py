@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM
+from browser_page import CHROMIUM, NO_CHROMIUM, pixels_of
 from playwright.sync_api import Page, expect
-from web_fixtures import Site, open_player, pixels_of
+from web_fixtures import Site, open_player
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 pytest_plugins = ("web_fixtures",)

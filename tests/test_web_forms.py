@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS
+from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS, pixels_of
 from playwright.sync_api import Page, expect
-from web_fixtures import Site, open_player, pixels_of
+from web_fixtures import Site, open_player
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 pytest_plugins = ("web_fixtures",)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS
+from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS, waits_for, watched_page
 from player_files import decode_picture
-from playwright.sync_api import Page, expect
-from web_fixtures import Site, open_player, waits_for
+from playwright.sync_api import Browser, Page, expect
+from web_fixtures import SIZE, Site, open_player
 
 from mvcodec.frames import Picture
 
@@ -28,16 +29,17 @@ pytestmark = [
 pytest_plugins = ("web_fixtures",)
 
 
-@pytest.fixture
-def page(tab: Page) -> Page:
+@pytest.fixture(scope="module")
+def page(chromium: Browser) -> Iterator[Page]:
     """A page with a headset at eye level that it has not begun to use."""
-    tab.add_init_script(path=EMULATOR)
-    tab.add_init_script("""
-        window.device = new IWER.XRDevice(IWER.metaQuest3);
-        device.installRuntime({ forceInstall: true }); // Chromium's own finds no device
-        device.stereoEnabled = true;
-    """)
-    return tab
+    for page in watched_page(chromium, *SIZE):
+        page.add_init_script(path=EMULATOR)
+        page.add_init_script("""
+            window.device = new IWER.XRDevice(IWER.metaQuest3);
+            device.installRuntime({ forceInstall: true }); // Chromium's own finds no device
+            device.stereoEnabled = true;
+        """)
+        yield page
 
 
 def enter(page: Page, site: Site, recording: Path, view: str) -> None:

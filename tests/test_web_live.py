@@ -5,10 +5,10 @@ from __future__ import annotations
 import io
 
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM
+from browser_page import CHROMIUM, NO_CHROMIUM, pixels_of
 from coding import config, frame_set, luma_psnr, make_array
 from playwright.sync_api import Page, expect
-from web_fixtures import Site, pixels_of
+from web_fixtures import Site
 
 from mvcodec.container import McapWriter
 from mvcodec.encoding.encoder import Encoder

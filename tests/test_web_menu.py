@@ -9,22 +9,17 @@ import av
 import cv2
 import numpy as np
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM
+from browser_page import CHROMIUM, NO_CHROMIUM, drop, pixels_of, set_slider, settled, toggle_menu, waits_for
 from numpy.typing import NDArray
 from player_files import Running, decode_picture
 from playwright.sync_api import Browser, Page, expect
-from web_fixtures import SAMPLE, Site, open_player, pixels_of, waits_for
+from web_fixtures import SAMPLE, Site, open_player
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 pytest_plugins = ("web_fixtures",)
 
 PAIRS = Path(__file__).parent / "conformance"
 OTHER = PAIRS / "odd_size.mcap"
-
-
-def settled(page: Page) -> None:
-    """Wait until what is asked for is on the screen with all detail."""
-    page.evaluate("document.querySelector('mvcodec-player').settled()")
 
 
 def canvas(page: Page) -> NDArray[np.int16]:
@@ -34,26 +29,8 @@ def canvas(page: Page) -> NDArray[np.int16]:
     return shot[: shot.shape[0] * 2 // 5].astype(np.int16)
 
 
-def toggle_menu(page: Page) -> None:
-    page.get_by_label("More").dispatch_event("click")  # the controls may have hidden by now
-
-
-def set_slider(page: Page, label: str, value: str) -> None:
-    page.get_by_label(label).fill(value)
-
-
 def test_a_file_that_is_dropped_is_shown(sample_page: Page) -> None:
-    sample_page.evaluate(
-        """(bytes) => {
-            const transfer = new DataTransfer();
-            transfer.items.add(new File([new Uint8Array(bytes)], "other.mcap"));
-            const player = document.querySelector("mvcodec-player");
-            const about = { dataTransfer: transfer, bubbles: true, cancelable: true };
-            player.dispatchEvent(new DragEvent("drop", about));
-            return player.ready;
-        }""",
-        list(OTHER.read_bytes()),
-    )
+    drop(sample_page, OTHER)
     assert pixels_of(sample_page).shape != (48, 64, 3)
 
 

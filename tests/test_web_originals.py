@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM
+from browser_page import CHROMIUM, NO_CHROMIUM, pixels_of, waits_for
 from command_line import fails, succeeds
 from player_files import Running, decode_picture, encode, playing, write_original
 from playwright.sync_api import Page, expect
-from web_fixtures import pixels_of, serve_folder, waits_for
+from web_fixtures import serve_folder
 
 from mvcodec.capture import open_input
 from mvcodec.evaluation.metrics import psnr

@@ -6,18 +6,13 @@ import http.client
 
 import numpy as np
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM, SCREENSHOTS
+from browser_page import CHROMIUM, NO_CHROMIUM, pixels_of, screenshot, settled, shown, waits_for
 from player_files import Running
 from playwright.sync_api import Page, expect
-from web_fixtures import SAMPLE, Site, open_player, pixels_of, waits_for
+from web_fixtures import SAMPLE, Site, open_player
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 pytest_plugins = ("web_fixtures",)
-
-
-def shown(page: Page) -> dict[str, object]:
-    found: dict[str, object] = page.evaluate("document.querySelector('mvcodec-player').shown")
-    return found
 
 
 def ask(sample_server: Running, path: str, **headers: str) -> http.client.HTTPResponse:
@@ -94,7 +89,7 @@ def test_dragging_looks_around_and_a_click_plays(sample_page: Page) -> None:
 
 
 def test_a_picture_that_is_held_gets_all_detail_when_it_is_let_go(sample_page: Page) -> None:
-    sample_page.evaluate("document.querySelector('mvcodec-player').settled()")
+    settled(sample_page)
     sample_page.mouse.move(480, 250)
     sample_page.mouse.down()
     sample_page.mouse.move(400, 250, steps=4)
@@ -155,7 +150,7 @@ def test_a_picture_that_stands_is_not_drawn_again(sample_page: Page) -> None:
     sample_page.keyboard.press(",")
     waits_for(sample_page, "shown.frame === 1")
     # The picture that stands is drawn once more, with all detail; then nobody asks for another one.
-    sample_page.evaluate("document.querySelector('mvcodec-player').settled()")
+    settled(sample_page)
     drawn = sample_page.evaluate("window.drawn")
     sample_page.evaluate("new Promise((resolve) => setTimeout(resolve, 600))")
     assert sample_page.evaluate("window.drawn") == drawn
@@ -211,19 +206,15 @@ def test_both_eyes_get_views_of_their_own(sample_page: Page) -> None:
 @pytest.mark.parametrize(
     ("width", "height", "scheme"), [(390, 800, "light"), (1280, 720, "dark"), (2560, 1440, "dark")]
 )
-def test_the_controls_fit_the_screen(
-    tab: Page, sample_server: Running, width: int, height: int, scheme: str
-) -> None:
-    tab.set_viewport_size({"width": width, "height": height})
-    tab.emulate_media(color_scheme="light" if scheme == "light" else "dark", reduced_motion="reduce")
-    tab.goto(sample_server.url)
-    tab.evaluate("document.querySelector('mvcodec-player').ready")
+def test_the_controls_fit_the_screen(sample_page: Page, width: int, height: int, scheme: str) -> None:
+    sample_page.set_viewport_size({"width": width, "height": height})
+    sample_page.emulate_media(color_scheme="light" if scheme == "light" else "dark", reduced_motion="reduce")
     for label in ("Play", "Show", "Speed", "More", "Full screen", "Time"):
-        box = tab.locator(".controls").get_by_label(label, exact=True).bounding_box()
+        box = sample_page.locator(".controls").get_by_label(label, exact=True).bounding_box()
         assert box is not None
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= width
         assert box["y"] + box["height"] <= height
-    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
-    tab.screenshot(path=SCREENSHOTS / f"web_{width}.png")
-    assert np.asarray(pixels_of(tab)).std() > 10
+    settled(sample_page)
+    screenshot(sample_page, f"web_{width}")
+    assert np.asarray(pixels_of(sample_page)).std() > 10

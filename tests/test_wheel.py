@@ -69,7 +69,7 @@ def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[s
 def test_page_and_type_marker_are_in_the_wheel(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as held:
         names = set(held.namelist())
-    page = {path.relative_to(ROOT).as_posix() for path in (ROOT / "mvcodec/player/page").rglob("*.*")}
+    page = {path.relative_to(ROOT).as_posix() for path in (ROOT / "mvcodec/web_player/dist").rglob("*.*")}
     assert page
     assert page | {"mvcodec/py.typed"} <= names
     assert not [name for name in names if name.startswith(("tests", "tools", "examples"))]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import re
 import threading
 from collections.abc import Iterator
@@ -11,17 +10,16 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from browser_page import watched_page
+from browser_page import PLAYER, watched_page
 from player_files import Running, playing
 from playwright.sync_api import Browser, Page
 
-from mvcodec.frames import Picture
 from mvcodec.web_player.pages import page_files
 
 pytest_plugins = ("chromium",)
 
+SIZE = (960, 600)
 SAMPLE = Path(__file__).parent / "conformance" / "square.mcap"
 """3 x 3 views of 64 x 48, six frames, ten a second."""
 
@@ -103,9 +101,19 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     yield from serve_folder(folder)
 
 
+@pytest.fixture(scope="module")
+def window(chromium: Browser) -> Iterator[Page]:
+    """One page for all tests of a file: to start one costs more than most of them."""
+    yield from watched_page(chromium, *SIZE)
+
+
 @pytest.fixture
-def tab(chromium: Browser) -> Iterator[Page]:
-    yield from watched_page(chromium, 960, 600)
+def tab(window: Page) -> Page:
+    """That page as it was at first, apart from its address."""
+    width, height = SIZE
+    window.set_viewport_size({"width": width, "height": height})
+    window.emulate_media(reduced_motion="reduce", color_scheme="light")
+    return window
 
 
 @pytest.fixture(scope="module")
@@ -117,33 +125,21 @@ def sample_server() -> Iterator[Running]:
 
 @pytest.fixture
 def sample_page(tab: Page, sample_server: Running) -> Page:
-    """Its page, on view 1,1."""
-    tab.goto(f"{sample_server.url}?view=1,1&t=0.2")
-    tab.evaluate("document.querySelector('mvcodec-player').ready")
+    """Its page, on view 1,1; opened again where it is there, which compiles no shaders."""
+    address = f"{sample_server.url}?view=1,1&t=0.2"
+    if tab.url != address:
+        tab.goto(address)
+        tab.evaluate(f"{PLAYER}.ready")
+        return tab
+    tab.evaluate("""() => {
+        const player = document.querySelector("mvcodec-player");
+        const root = player.shadowRoot;
+        root.activeElement?.blur();
+        root.querySelector("dialog").close();
+        for (const name of [".menu", ".stats"]) root.querySelector(name).hidden = true;
+        return player.open("video.mcap", { view: { row: 1, col: 1 }, seconds: 0.2 });
+    }""")
     return tab
-
-
-def pixels_of(page: Page, selector: str = "mvcodec-player", fine: bool = True) -> Picture:
-    """What the player's `pixels()` gives, as RGB: as the picture stands or, not `fine`, as it moves."""
-    width, height, data = page.evaluate(
-        """([selector, fine]) => {
-            const { width, height, data } = document.querySelector(selector).pixels(fine);
-            let text = "";
-            for (let i = 0; i < data.length; i += 32768) {
-                text += String.fromCharCode(...data.subarray(i, i + 32768));
-            }
-            return [width, height, btoa(text)];
-        }""",
-        [selector, fine],
-    )
-    return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4)[..., :3]
-
-
-def waits_for(page: Page, condition: str) -> None:
-    """Wait until something holds of what is `shown`."""
-    page.wait_for_function(
-        f"() => {{ const shown = document.querySelector('mvcodec-player').shown; return {condition}; }}"
-    )
 
 
 def open_player(page: Page, site: Site, recording: str, attributes: str = "") -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from mvcodec.array import Viewpoint
 from mvcodec.errors import InputError
-from mvcodec.player.looks import LOOKS
+from mvcodec.player.looks import EYES, LOOKS
 
 MAX_MESSAGE_BYTES = 1024
 """The longest legal message has under 100 bytes."""
@@ -83,8 +84,9 @@ class Show:
 
 @dataclass(frozen=True, slots=True)
 class Eyes:
-    """The distance of two eyes, in steps of the grid."""
+    """One of EYES, and the distance of two eyes in steps of the grid."""
 
+    mode: str
     steps: float
 
 
@@ -93,6 +95,13 @@ class Dolly:
     """Look from ahead of the cameras' plane, by a share of the farthest that is allowed."""
 
     share: float
+
+
+@dataclass(frozen=True, slots=True)
+class Focus:
+    """The disparity in focus, px between neighbouring real cameras; None: everything is."""
+
+    px: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,13 +123,6 @@ class Probe:
 
 
 @dataclass(frozen=True, slots=True)
-class Measure:
-    """Measure each picture against the original, where there is one."""
-
-    measure: bool
-
-
-@dataclass(frozen=True, slots=True)
 class Shown:
     """The page has drawn this picture and can take another."""
 
@@ -139,9 +141,9 @@ Message = (
     | Show
     | Eyes
     | Dolly
+    | Focus
     | Wipe
     | Probe
-    | Measure
     | Shown
 )
 
@@ -208,10 +210,17 @@ def _share(name: str, value: Any) -> float:
     return number
 
 
-def _look(name: str, value: Any) -> str:
-    if not isinstance(value, str) or value not in LOOKS:
-        raise InputError(name, _short(value), f"one of {', '.join(LOOKS)}")
+def _number_or_null(name: str, value: Any) -> float | None:
+    return None if value is None else _number(name, value)
+
+
+def _one_of(choices: Collection[str], name: str, value: Any) -> str:
+    if not isinstance(value, str) or value not in choices:
+        raise InputError(name, _short(value), f"one of {', '.join(choices)}")
     return value
+
+
+_look, _eyes = partial(_one_of, LOOKS), partial(_one_of, EYES)
 
 
 def _short(value: object) -> str:
@@ -231,11 +240,11 @@ _FORMS: dict[str, tuple[dict[str, _Check], Callable[..., Message]]] = {
     "loop": ({"loop": _truth}, Loop),
     "section": ({"first": _whole, "last": _whole}, Section),
     "show": ({"look": _look}, Show),
-    "eyes": ({"steps": _number}, Eyes),
+    "eyes": ({"mode": _eyes, "steps": _number}, Eyes),
     "dolly": ({"share": _share}, Dolly),
+    "focus": ({"px": _number_or_null}, Focus),
     "wipe": ({"share": _share}, Wipe),
     "probe": ({"x": _share, "y": _share}, Probe),
-    "measure": ({"measure": _truth}, Measure),
     "shown": ({"picture": _whole}, Shown),
 }
 """Message types: their fields, each with its check, and what is made of them."""

@@ -45,7 +45,7 @@ class Originals:
         """
         place = view.viewpoint.position
         if place is None:
-            return Quality(None, None, "no original between the grid's places (g goes to the nearest)")
+            return Quality(None, None, "no original between the grid's places")
         original = self.picture(decoded.index, place)
         if original is None:
             return Quality(None, None, f"the original has no frame {decoded.index}")

@@ -40,10 +40,10 @@ Palette = NDArray[np.uint8]
 """uint8 (N, 3), RGB."""
 
 
-def disparity(decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, dict[str, Any]]:
+def disparity(decoded: DecodedSet, view: RenderedView) -> tuple[Picture, dict[str, Any]]:
     """The view's disparity in colours: blue is far, red is near."""
     low, high = decoded.disparity_range_px
-    codes = np.clip((views[0].disparity_px - low) * (255 / (high - low)), 0, 255).astype(np.uint8)
+    codes = np.clip((view.disparity_px - low) * (255 / (high - low)), 0, 255).astype(np.uint8)
     colours = _turbo()
     stops = colours[np.linspace(0, 255, SCALE_COLOURS).round().astype(int)]
     return colours[codes], {
@@ -55,9 +55,8 @@ def disparity(decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Pictu
     }
 
 
-def layers(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, dict[str, Any]]:
+def layers(_decoded: DecodedSet, view: RenderedView) -> tuple[Picture, dict[str, Any]]:
     """The view's depth layers (thesis 4.3.2), a colour each, over its luma."""
-    view = views[0]
     # The thesis's own split joins real scenes into one or two layers, which shows nothing.
     stack = split_levels(DisparityMap(view.disparity_px, view.seen_by > 0))
     count = len(stack.bounds_px)
@@ -70,9 +69,8 @@ def layers(_decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture
     return _tinted(view.pixels, stack.labels, colours), _classes(text, stack.labels, colours, names)
 
 
-def provenance(decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, dict[str, Any]]:
+def provenance(decoded: DecodedSet, view: RenderedView) -> tuple[Picture, dict[str, Any]]:
     """How many real cameras saw each pixel, over the view's luma."""
-    view = views[0]
     most = len(PROVENANCE) - 1
     seen = np.minimum(view.seen_by, most)
     colours = np.array(PROVENANCE, np.uint8)
@@ -88,9 +86,8 @@ def difference(view: RenderedView, original: Picture) -> tuple[Picture, dict[str
     return _grey(error, DIFFERENCE_GAIN, "Difference to the original, levels")
 
 
-def disagreement(decoded: DecodedSet, views: Sequence[RenderedView]) -> tuple[Picture, dict[str, Any]]:
+def disagreement(decoded: DecodedSet, view: RenderedView) -> tuple[Picture, dict[str, Any]]:
     """How much the cameras that see a point differ there: the deviation of their luma, warped to the view."""
-    view = views[0]
     near = find_cameras(decoded, view.viewpoint, SPREAD)
     rows, cols = np.indices(view.disparity_px.shape, np.float32)
     total, mean, squares = (np.zeros(view.disparity_px.shape, np.float32) for _ in range(3))

@@ -22,10 +22,12 @@ from mvcodec.frames import DecodedSet, Picture, RenderedView
 from mvcodec.player import overlays
 from mvcodec.player.ahead import move_ahead
 from mvcodec.player.draft import QUICKER, SMALLER, Level, in_full_px, shrink
-from mvcodec.player.looks import LOOKS
+from mvcodec.player.focus import lens_around, through_lens
+from mvcodec.player.looks import COMPARING, EYES, LOOKS, Legend
 from mvcodec.player.originals import Originals
 from mvcodec.player.session import Enhanced, PictureRequest
 from mvcodec.player.synthesizer_pool import SynthesizerPool
+from mvcodec.player.thumbnails import Thumbnails
 from mvcodec.synthesis.synthesizer import Preparing, Synthesizer
 from mvcodec.synthesis.towards_enhanced import TowardsEnhanced, views_near
 from mvcodec.workers import thread_count
@@ -67,6 +69,7 @@ class PictureMaker:
 
     Attributes:
         store: the file's frame sets.
+        thumbnails: small pictures of the file.
         at_once: how many pictures may be asked for at the same time.
         levels: at which pictures can be made.
         originals: to measure against; None at first.
@@ -84,6 +87,7 @@ class PictureMaker:
         matcher: str | None = None,
     ) -> None:
         self.store = FrameStore(path, limits=limits, matcher=matcher)
+        self.thumbnails = Thumbnails(path, limits)
         self.originals: Originals | None = None
         self.at_once = min(thread_count(), MOST_AT_ONCE)
         self.levels = SMALLER if make_quick is None else QUICKER
@@ -111,22 +115,22 @@ class PictureMaker:
         if upcoming:
             self._begin(replace(request, frame=upcoming[0]), upcoming[1:])
         start = time.perf_counter()
-        decoded, look = self._drafts.of(stored.decoded, request.level.scale), LOOKS[request.look]
-        viewpoints = self._viewpoints(request)
-        views = self._render(decoded, viewpoints, request.level)
+        decoded = self._drafts.of(stored.decoded, request.level.scale)
+        views = self._render(decoded, self._viewpoints(request), self._level(request))
         if request.dolly > 0:
             array, range_px = stored.decoded.array, stored.decoded.disparity_range_px
             views = [move_ahead(view, array, range_px, request.dolly) for view in views]
         rendered = time.perf_counter()
+        shown = replace(decoded, disparity_range_px=stored.decoded.disparity_range_px)
         original = self._original(request, decoded)
-        if original is None:
-            shown = replace(decoded, disparity_range_px=stored.decoded.disparity_range_px)
-            picture, legend = look.compose(shown, views)
+        pictures, legend = _composed(request, shown, views, original)
+        if request.focus_px is None:
+            picture = EYES[request.eyes].combine(pictures)
         else:
-            picture, legend = overlays.difference(views[0], original)
-        if len(views) == 1:
-            left = round(request.wipe * picture.shape[1])
-            picture = np.hstack([views[0].pixels[:, :left], picture[:, left:]])
+            low, high = decoded.disparity_range_px
+            focus_px = min(max(request.focus_px * request.level.scale, low), high)
+            seen = [replace(view, pixels=one) for view, one in zip(views, pictures, strict=True)]
+            picture = through_lens(decoded, seen, request.viewpoint, focus_px)
         jpeg = to_jpeg(picture)
         done = time.perf_counter()
         facts = {
@@ -138,6 +142,9 @@ class PictureMaker:
             "dolly": request.dolly,
             "wipe": request.wipe,
             "look": request.look,
+            "eyes": request.eyes,
+            "eye_steps": request.eye_steps,
+            "focus_px": request.focus_px,
             "scale": request.level.scale,
             "quick": request.level.quick,
             "enhanced": bool(self._near(request) & decoded.enhanced.keys()),
@@ -154,11 +161,19 @@ class PictureMaker:
     def close(self) -> None:
         """Let go of the file; waits for pictures being made ahead."""
         self._ahead.shutdown(cancel_futures=True)
+        self.thumbnails.close()
         self.store.close()
 
     def _viewpoints(self, request: PictureRequest) -> tuple[Viewpoint, ...]:
         array = self.store.table.header.array
-        return LOOKS[request.look].place(array, request.viewpoint, request.eye_steps)
+        if request.focus_px is not None:
+            return lens_around(array, request.viewpoint)
+        return EYES[request.eyes].place(array, request.viewpoint, request.eye_steps)
+
+    def _level(self, request: PictureRequest) -> Level:
+        """As asked for; an average of many views is drawn quickly, which it hides."""
+        hasty = request.focus_px is not None and self.levels is QUICKER
+        return replace(request.level, quick=True) if hasty else request.level
 
     def _near(self, request: PictureRequest) -> frozenset[Position]:
         """The views that have a share in a picture if they are enhanced."""
@@ -207,14 +222,14 @@ class PictureMaker:
     def _measure(
         self, request: PictureRequest, decoded: DecodedSet, views: list[RenderedView]
     ) -> dict[str, Any] | None:
-        if self.originals is None or not request.measure or len(views) != 1:
+        if self.originals is None or request.look != COMPARING:
             return None
         return asdict(self.originals.measure(decoded, views[0]))
 
     def _original(self, request: PictureRequest, decoded: DecodedSet) -> Picture | None:
         """What the look `difference` compares with; None where there is nothing."""
         place = request.viewpoint.position
-        if request.look != "difference" or self.originals is None or place is None:
+        if request.look != COMPARING or self.originals is None or place is None:
             return None
         return self.originals.picture(decoded.index, place)
 
@@ -227,6 +242,22 @@ class PictureMaker:
             "goes_on_s": times[damage.end] / 1e9 if goes_on else None,
             "message": damage.message,
         }
+
+
+def _composed(
+    request: PictureRequest, decoded: DecodedSet, views: Sequence[RenderedView], original: Picture | None
+) -> tuple[list[Picture], Legend]:
+    """Each view as its look shows it, left of the wipe the picture itself; and the first one's legend."""
+    pictures, legends = [], []
+    for view in views:
+        if original is None:
+            picture, legend = LOOKS[request.look](decoded, view)
+        else:
+            picture, legend = overlays.difference(view, original)
+        left = round(request.wipe * picture.shape[1])
+        pictures.append(np.hstack([view.pixels[:, :left], picture[:, left:]]))
+        legends.append(legend)
+    return pictures, legends[0]
 
 
 class _Drafts:

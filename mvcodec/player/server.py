@@ -12,48 +12,31 @@ from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
 from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from mvcodec.array import Viewpoint
 from mvcodec.depth import depth_m
 from mvcodec.errors import InputError, MvCodecError
 from mvcodec.frames import RenderedView
 from mvcodec.player.access import AccessRules
-from mvcodec.player.looks import LOOKS
+from mvcodec.player.looks import COMPARING, LOOKS
 from mvcodec.player.messages import Probe, parse_message
-from mvcodec.player.picture_maker import MadePicture, PictureMaker
+from mvcodec.player.page_files import CLOSE_REFUSED, HEADERS, Guard, page_routes
+from mvcodec.player.picture_maker import MadePicture, PictureMaker, to_jpeg
 from mvcodec.player.session import PictureRequest, Session
 
 MAX_VIEWERS = 32
 
-CLOSE_MALFORMED = 1008
 CLOSE_BUSY = 1013
 CLOSE_BROKEN = 1011
-
-PAGE_TYPES = {
-    ".html": "text/html; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".svg": "image/svg+xml",
-}
-
-PAGE_HEADERS = {
-    "Content-Security-Policy": (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
-        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-    ),
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Cache-Control": "no-cache",
-}
 
 _log = logging.getLogger(__name__)
 
@@ -76,52 +59,33 @@ class Broadcast:
 
 
 def make_app(broadcast: Broadcast, rules: AccessRules) -> ASGIApp:
-    """The application: the page at ``/``, its files, and the WebSocket at ``/view``."""
+    """The application: the page at ``/``, its files, thumbnails, and the WebSocket at ``/view``."""
     viewers = _Viewers(broadcast)
     routes: list[Route | WebSocketRoute] = [
-        Route("/" if name == "index.html" else f"/{name}", _page_file(name)) for name in _page_names()
+        *page_routes(broadcast.title, 'server="view"'),
+        Route("/thumbnail/{frame:int}", _thumbnail(broadcast)),
+        WebSocketRoute("/view", viewers.serve),
     ]
-    routes.append(WebSocketRoute("/view", viewers.serve))
     return Guard(Starlette(routes=routes), rules)
 
 
-class Guard:
-    """Refuses what the access rules refuse, before anything else looks at it."""
+def _thumbnail(broadcast: Broadcast) -> Callable[[Request], Awaitable[Response]]:
+    """A small picture of a frame, as seen from about a viewpoint: `thumbnail/FRAME?row=R&col=C`."""
 
-    def __init__(self, app: ASGIApp, rules: AccessRules) -> None:
-        self._app, self._rules = app, rules
+    def make(frame: int, place: Viewpoint) -> Response:
+        picture = broadcast.maker.thumbnails.picture(frame, place)
+        if picture is None:
+            return PlainTextResponse("no such picture\n", 404, HEADERS)
+        return Response(to_jpeg(picture), headers=HEADERS, media_type="image/jpeg")
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] in ("http", "websocket"):
-            headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
-            host = headers.get(b"host")
-            allowed = self._rules.allows_host(host)
-            if scope["type"] == "websocket":
-                allowed = allowed and self._rules.allows_origin(headers.get(b"origin"), host)
-            if not allowed:
-                await _refuse(scope, receive, send)
-                return
-        await self._app(scope, receive, send)
-
-
-async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
-    if scope["type"] == "websocket":
-        await send({"type": "websocket.close", "code": CLOSE_MALFORMED})
-    else:
-        await PlainTextResponse("refused: unknown Host\n", 403)(scope, receive, send)
-
-
-def _page_names() -> list[str]:
-    page = files("mvcodec.player").joinpath("page")
-    return sorted(item.name for item in page.iterdir() if item.name[item.name.rfind(".") :] in PAGE_TYPES)
-
-
-def _page_file(name: str) -> Callable[[Request], Awaitable[Response]]:
-    content = files("mvcodec.player").joinpath("page", name).read_bytes()
-    media_type = PAGE_TYPES[name[name.rfind(".") :]]
-
-    async def endpoint(_request: Request) -> Response:
-        return Response(content, media_type=media_type, headers=PAGE_HEADERS)
+    async def endpoint(request: Request) -> Response:
+        try:
+            row, col = (float(request.query_params[name]) for name in ("row", "col"))
+            return await run_in_threadpool(make, request.path_params["frame"], Viewpoint(row, col))
+        except (KeyError, ValueError):
+            return PlainTextResponse("expected ?row=R&col=C\n", 400, HEADERS)
+        except MvCodecError as error:
+            return PlainTextResponse(f"{error}\n", 500, HEADERS)
 
     return endpoint
 
@@ -180,7 +144,7 @@ class _Viewer:
 
     async def _close_after(self, error: Exception) -> None:
         """Close this connection, and nothing else, saying why."""
-        code = CLOSE_MALFORMED if isinstance(error, InputError) else CLOSE_BROKEN
+        code = CLOSE_REFUSED if isinstance(error, InputError) else CLOSE_BROKEN
         if code == CLOSE_BROKEN:
             _log.error("a viewer's connection broke", exc_info=error)
         # The reason of a close frame has 123 bytes at most.
@@ -202,23 +166,20 @@ class _Viewer:
             self._news.set()
 
     async def _tell_place(self, probe: Probe) -> None:
-        """What is seen at a place of the picture that was sent last; nothing where it shows several views."""
+        """What is seen at a place of the picture that was sent last; null where that shows several views."""
+        facts: dict[str, Any] = {"type": "place", "x": probe.x, "y": probe.y}
+        await self._socket.send_text(json.dumps(facts | self._seen_at(probe.x, probe.y)))
+
+    def _seen_at(self, x: float, y: float) -> dict[str, float | None]:
         view = self._last
         if view is None:
-            return
+            return {"disparity_px": None, "depth_m": None}
         height, width = view.disparity_px.shape
-        row, col = min(int(probe.y * height), height - 1), min(int(probe.x * width), width - 1)
+        row, col = min(int(y * height), height - 1), min(int(x * width), width - 1)
         found = view.disparity_px[row : row + 1, col : col + 1]
         array = self._broadcast.maker.store.table.header.array
         depth = float(depth_m(array, found)[0, 0]) if array.calibration.given else math.inf
-        facts = {
-            "type": "place",
-            "x": probe.x,
-            "y": probe.y,
-            "disparity_px": float(found[0, 0]),
-            "depth_m": depth if math.isfinite(depth) else None,
-        }
-        await self._socket.send_text(json.dumps(facts))
+        return {"disparity_px": float(found[0, 0]), "depth_m": depth if math.isfinite(depth) else None}
 
     async def _send(self) -> None:
         await self._socket.send_text(json.dumps(self._greeting()))
@@ -290,16 +251,19 @@ class _Viewer:
             "title": broadcast.title,
             "rows": array.rows,
             "cols": array.cols,
-            "real": [list(camera) for camera in array.real],
+            "real_rows": array.real_rows,
+            "real_cols": array.real_cols,
             "enhanced": sorted(map(list, table.enhanced)),
             "width": array.width,
             "height": array.height,
             "fps": array.fps,
             "frames": table.count,
-            "first_s": table.times_ns[0] / 1e9,
-            "last_s": table.times_ns[-1] / 1e9,
-            "looks": list(LOOKS),
+            "times_s": [(time_ns - table.times_ns[0]) / 1e9 for time_ns in table.times_ns],
+            "range_px": table.header.disparity_range_px,
+            "infinity_px_per_step": array.calibration.d_inf_px_per_step,
+            "rho": array.rho,
+            "codec": table.header.codec,
+            "looks": [look for look in LOOKS if look != COMPARING or broadcast.maker.originals is not None],
             "synthesizer": broadcast.synthesizer,
-            "measurable": broadcast.maker.originals is not None,
             "cut_off": table.cut_off,
         }

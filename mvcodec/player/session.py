@@ -15,12 +15,12 @@ from typing import Any
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.player.clock import PlayClock
 from mvcodec.player.draft import SMALLER, WHOLE, Level, Pace
-from mvcodec.player.looks import LOOKS
+from mvcodec.player.looks import COMPARING, EXACT, EYES, ONE
 from mvcodec.player.messages import (
     Dolly,
     Eyes,
+    Focus,
     Loop,
-    Measure,
     Message,
     Move,
     Play,
@@ -60,10 +60,11 @@ class PictureRequest:
         frame: of the file, from 0.
         viewpoint: within the array.
         look: a name of LOOKS.
-        eye_steps: distance of two eyes in steps of the grid; 0 where the look is for one.
+        eyes: a name of EYES.
+        eye_steps: distance of two eyes in steps of the grid; 0 where one view is shown.
         dolly: how far ahead of the cameras' plane, as a share of the farthest; 0 where views are compared.
         wipe: share of the width, from the left, that shows the picture whatever the look.
-        measure: against the original.
+        focus_px: the disparity in focus, px between neighbouring real cameras; None: everything is sharp.
         level: how it is made.
         enhanced: what is done for the enhanced views near to it.
     """
@@ -71,10 +72,11 @@ class PictureRequest:
     frame: int
     viewpoint: Viewpoint
     look: str = "picture"
+    eyes: str = ONE
     eye_steps: float = 0.0
     dolly: float = 0.0
     wipe: float = 0.0
-    measure: bool = False
+    focus_px: float | None = None
     level: Level = WHOLE
     enhanced: Enhanced = Enhanced.AT_HAND
 
@@ -169,21 +171,25 @@ class Session:
                 self._wanted = replace(self._wanted, wipe=share)
             case Show(look):
                 self._wanted = replace(self._wanted, look=look)
-            case Eyes(steps):
+            case Eyes(mode, steps):
+                self._wanted = replace(self._wanted, eyes=mode)
                 self._eye_steps = min(max(steps, 0.0), float(self._array.cols - 1))
-            case Measure(measure):
-                self._wanted = replace(self._wanted, measure=measure)
+            case Focus(px):
+                self._wanted = replace(self._wanted, focus_px=px)
 
     def next_request(self, now_s: float) -> PictureRequest | None:
         """The picture to make now; None while there is nothing new, or the page is still busy."""
         if not self._ready or len(self._in_flight) >= MAX_IN_FLIGHT:
             return None
-        eye_steps = self._eye_steps if LOOKS[self._wanted.look].stereo else 0.0
+        eye_steps = 0.0 if self._wanted.eyes == ONE else self._eye_steps
         request = replace(self._wanted, frame=self._clock.advance(now_s), eye_steps=eye_steps)
-        # A picture that stands, or that is measured or compared, is never a draft.
-        is_exact = request.measure or request.look == "difference"
+        # What cameras are compared with is never a draft, nor ahead of their plane.
+        is_exact = request.look in EXACT
         if is_exact:
             request = replace(request, dolly=0.0)
+        if request.look == COMPARING:  # one sharp view, from where an original was taken
+            place = _nearest_place(request.viewpoint)
+            request = replace(request, viewpoint=place, eyes=ONE, eye_steps=0.0, focus_px=None)
         if (self._clock.playing or self._moving(now_s)) and not is_exact:
             request = replace(request, level=self._pace.level)
         if self._clock.playing and self._keeps_up and not self._moving(now_s):
@@ -201,7 +207,7 @@ class Session:
         last = self._last
         if last is None or last.enhanced is Enhanced.ALL:
             return False
-        places = LOOKS[last.look].place(self._array, last.viewpoint, last.eye_steps)
+        places = EYES[last.eyes].place(self._array, last.viewpoint, last.eye_steps)
         return bool(self._enhanced & views_near(self._array, places))
 
     def upcoming(self) -> tuple[int, ...]:
@@ -255,3 +261,8 @@ class Session:
         row = min(max(viewpoint.row, 0.0), array.rows - 1.0)
         col = min(max(viewpoint.col, 0.0), array.cols - 1.0)
         return Viewpoint(row, col)
+
+
+def _nearest_place(viewpoint: Viewpoint) -> Viewpoint:
+    """The same rounding as the page's."""
+    return Viewpoint(float(math.floor(viewpoint.row + 0.5)), float(math.floor(viewpoint.col + 0.5)))

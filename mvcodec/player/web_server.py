@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import html
 import io
-from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import Path
 
@@ -20,19 +18,9 @@ from mvcodec.array import Position
 from mvcodec.errors import MvCodecError
 from mvcodec.player.access import AccessRules
 from mvcodec.player.originals import Originals
-from mvcodec.player.server import Guard
-from mvcodec.web_player.pages import TYPES, content_policy, page_files
+from mvcodec.player.page_files import HEADERS, Guard, page_routes
 
 RECORDING, ORIGINALS = "video.mcap", "original"
-
-HEADERS = {
-    "Content-Security-Policy": content_policy("'self'", "'self'", "'self' blob: data:")
-    + "; frame-ancestors 'none'",
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Cache-Control": "no-cache",
-}
 
 
 def make_web_app(recording: Path, originals: Originals | None, rules: AccessRules) -> ASGIApp:
@@ -43,13 +31,7 @@ def make_web_app(recording: Path, originals: Originals | None, rules: AccessRule
         originals: served as ``original/FRAME/ROW/COL.png``, for the page to compare with.
     """
     attributes = f'src="{RECORDING}"' + ("" if originals is None else f' originals="{ORIGINALS}"')
-    routes = [
-        Route(
-            "/" if name == "index.html" else f"/{name}",
-            _fixed(name, _shown(content, recording.name, attributes)),
-        )
-        for name, content in page_files().items()
-    ]
+    routes = page_routes(recording.name, attributes)
 
     async def file(_request: Request) -> Response:
         return FileResponse(recording, media_type="application/octet-stream", headers=HEADERS)
@@ -78,18 +60,3 @@ def _png(originals: Originals, frame: int, place: Position) -> bytes | None:
     room = io.BytesIO()
     Image.fromarray(picture).save(room, "PNG", compress_level=1)
     return room.getvalue()
-
-
-def _shown(content: bytes, name: str, attributes: str) -> bytes:
-    """The page shows the recording, by its name; nothing else has what is replaced."""
-    page = content.replace(b"<title>mvcodec</title>", f"<title>{html.escape(name)}</title>".encode())
-    return page.replace(b"<mvcodec-player page>", f"<mvcodec-player page {attributes}>".encode())
-
-
-def _fixed(name: str, content: bytes) -> Callable[[Request], Awaitable[Response]]:
-    media_type = TYPES[name[name.rfind(".") :]]
-
-    async def endpoint(_request: Request) -> Response:
-        return Response(content, media_type=media_type, headers=HEADERS)
-
-    return endpoint

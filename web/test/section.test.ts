@@ -1,16 +1,16 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Section } from "../src/player/section.ts";
+import { Marks } from "../src/player/section.ts";
 import { parseView, timeText } from "../src/player/format.ts";
 
 test("one mark loops to the file's end, two between them", () => {
-  const section = new Section();
+  const section = new Marks();
   assert.deepEqual(section.mark("from", 0.2, 0.5), { from: 0.2, to: 0.5 });
   assert.deepEqual(section.mark("to", 0.4, 0.5), { from: 0.2, to: 0.4 });
 });
 
 test("a mark that is set where it is ends the loop, and so does an empty one", () => {
-  const section = new Section();
+  const section = new Marks();
   section.mark("from", 0.2, 0.5);
   assert.equal(section.mark("from", 0.2, 0.5), undefined);
   section.mark("to", 0.3, 0.5);

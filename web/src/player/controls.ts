@@ -1,34 +1,22 @@
 /** The bar of controls: what it is made of, and how it follows the player. */
 
 import { LOOKS, type Look } from "../synthesis/renderer.ts";
+import type { Commands } from "./commands.ts";
 import { button, element, icon, options } from "./dom.ts";
 import { EYE_MODES, type Eyes } from "./drawing.ts";
+import type { Engine } from "./engine.ts";
 import { timeText } from "./format.ts";
 import { SPEEDS } from "./playback.ts";
+import type { Section } from "./section.ts";
 import { TEXTS } from "./texts.ts";
 import { Tilt } from "./tilt.ts";
 
-/** What the controls ask for. */
-export interface Actions {
-  togglePlay(): void;
-  step(by: number): void;
-  seekTo(seconds: number): void;
-  setSpeed(speed: number): void;
-  setLook(look: Look): void;
-  setEyes(mode: Eyes["mode"]): void;
-  setWipe(share: number): void;
-  setFocus(disparity: number | undefined): void;
-  savePicture(): void;
-  saveClip(): void;
-  copyLink(): void;
+/** What the controls ask of the page around the picture. */
+export interface Surroundings {
+  tell(text: string): void;
   openFile(): void;
   toggleFullscreen(): void;
-  /** Ask for the phone's turns; whether that is allowed. */
-  followTilt(): Promise<boolean>;
-  toggleHeadset(): void;
   showHelp(): void;
-  /** A small picture of a time; undefined where there is none. */
-  peek(seconds: number): Promise<ImageData | undefined>;
 }
 
 /** What the controls show. */
@@ -41,8 +29,10 @@ export interface ControlState {
   readonly speed: number;
   readonly look: Look;
   readonly eyes: Eyes["mode"];
+  /** Of the eyes, in steps of the array. */
+  readonly distance: number;
   readonly isImmersed: boolean;
-  readonly section: { from: number; to: number } | undefined;
+  readonly section: Section | undefined;
   readonly isGrowing: boolean;
 }
 
@@ -53,7 +43,8 @@ const FOCUS_OFF = 0;
 export class Controls {
   readonly bar: HTMLElement;
   readonly menu: HTMLElement;
-  readonly #actions: Actions;
+  readonly #commands: Commands;
+  readonly #around: Surroundings;
   readonly #play: HTMLButtonElement;
   readonly #time = element("span", { class: "time" });
   readonly #timeline = element("input", { type: "range", min: "0", max: "0", step: "1", "aria-label": TEXTS.timeline });
@@ -62,30 +53,36 @@ export class Controls {
   readonly #speed = element("select", { "aria-label": TEXTS.speed, title: TEXTS.speed });
   readonly #look = element("select", { "aria-label": TEXTS.show, title: TEXTS.show });
   readonly #eyes = element("select", { "aria-label": TEXTS.views });
+  readonly #distance = element("input", { type: "range", min: "0", max: "1", step: "0.05", value: "0.5" });
+  readonly #distanceBox = element("label", { hidden: true }, TEXTS.distance, this.#distance);
   readonly #wipe = element("input", { type: "range", min: "0", max: "1", step: "0.01", value: "0" });
   readonly #focus = element("input", { type: "range", min: "0", max: "100", step: "1", value: "0" });
   readonly #headset: HTMLButtonElement;
   readonly #tilt: HTMLButtonElement;
   /** What does nothing without a file. */
   readonly #forFile: (HTMLButtonElement | HTMLInputElement | HTMLSelectElement)[] = [];
+  #isHeadsetThere = false;
+  #canImmerse = false;
   #range: readonly [number, number] = [0, 1];
   #duration = 0;
   #peeked = 0;
 
-  constructor(actions: Actions) {
-    this.#actions = actions;
-    this.#play = button(TEXTS.play, icon("play"), () => actions.togglePlay());
+  constructor(commands: Commands, around: Surroundings) {
+    this.#commands = commands;
+    this.#around = around;
+    this.#play = button(TEXTS.play, icon("play"), () => commands.togglePlay());
     options(this.#speed, SPEEDS.map((speed) => [String(speed), `${speed}×`]));
     options(this.#look, Object.entries(TEXTS.looks));
     options(this.#eyes, Object.entries(TEXTS.eyes));
     this.#headset = button(TEXTS.headset, TEXTS.headset, () => {
       this.toggleMenu(false);
-      actions.toggleHeadset();
+      void commands.toggleHeadset();
     });
     this.#headset.hidden = true;
     this.#tilt = button(TEXTS.tilt, TEXTS.tilt, async () => {
       this.toggleMenu(false);
-      this.#tilt.hidden = await actions.followTilt();
+      this.#tilt.hidden = await Tilt.ask();
+      if (!this.#tilt.hidden) around.tell(TEXTS.tiltRefused);
     });
     this.#tilt.hidden = !Tilt.asksFirst;
     this.menu = this.#makeMenu();
@@ -93,8 +90,14 @@ export class Controls {
     this.#listen();
   }
 
-  setRange(range: readonly [number, number]): void {
-    this.#range = range;
+  /** What an engine has to offer. */
+  offer({ header, looks, canImmerse }: Engine): void {
+    this.#range = header.range;
+    this.#wipe.value = this.#focus.value = "0";
+    this.#distance.max = String(header.cols - 1);
+    this.#canImmerse = canImmerse;
+    for (const option of this.#look.options) option.hidden = option.disabled = !looks.some((look) => look === option.value);
+    this.#showHeadset();
   }
 
   /** Whether there is a file that they can do something with. */
@@ -102,13 +105,9 @@ export class Controls {
     for (const control of this.#forFile) control.disabled = !isOpen;
   }
 
-  /** Whether there is something to compare with. */
-  offerOriginals(areThere: boolean): void {
-    for (const option of this.#look.options) if (option.value === "difference") option.hidden = option.disabled = !areThere;
-  }
-
   offerHeadset(isThere: boolean): void {
-    this.#headset.hidden = !isThere;
+    this.#isHeadsetThere = isThere;
+    this.#showHeadset();
   }
 
   toggleMenu(isOpen = this.menu.hidden): void {
@@ -131,6 +130,8 @@ export class Controls {
     this.#speed.value = String(state.speed);
     this.#look.value = state.look;
     this.#eyes.value = state.eyes;
+    this.#distanceBox.hidden = state.eyes === "one";
+    this.#distance.value = String(state.distance);
     const headset = state.isImmersed ? TEXTS.headsetOff : TEXTS.headset;
     if (this.#headset.title !== headset) {
       this.#headset.title = headset;
@@ -146,9 +147,9 @@ export class Controls {
   }
 
   #makeBar(): HTMLElement {
-    const actions = this.#actions;
+    const commands = this.#commands;
     this.#play.classList.add("fills");
-    const [back, on] = [button(TEXTS.back, icon("back"), () => actions.step(-1)), button(TEXTS.on, icon("on"), () => actions.step(1))];
+    const [back, on] = [button(TEXTS.back, icon("back"), () => commands.step(-1)), button(TEXTS.on, icon("on"), () => commands.step(1))];
     this.#forFile.push(back, this.#play, on, this.#timeline, this.#look, this.#speed);
     this.#speed.value = "1";
     return element("div", { class: "controls" },
@@ -162,42 +163,49 @@ export class Controls {
         this.#look,
         this.#speed,
         button(TEXTS.more, icon("more"), () => this.toggleMenu()),
-        button(TEXTS.fullscreen, icon("fullscreen"), () => actions.toggleFullscreen()),
+        button(TEXTS.fullscreen, icon("fullscreen"), () => this.#around.toggleFullscreen()),
       ),
     );
   }
 
   #makeMenu(): HTMLElement {
-    const actions = this.#actions;
+    const commands = this.#commands;
+    const around = this.#around;
     const act = (text: string, call: () => void) => button(text, text, () => {
       this.toggleMenu(false);
       call();
     });
     return element("div", { class: "menu", hidden: true },
       element("label", {}, TEXTS.views, this.#eyes),
+      this.#distanceBox,
       element("label", {}, TEXTS.wipe, this.#wipe),
       element("label", {}, TEXTS.focus, this.#focus),
       this.#headset,
       this.#tilt,
-      act(TEXTS.savePicture, () => actions.savePicture()),
-      act(TEXTS.saveClip, () => actions.saveClip()),
-      act(TEXTS.copyLink, () => actions.copyLink()),
-      act(TEXTS.openFile, () => actions.openFile()),
-      act(TEXTS.help, () => actions.showHelp()),
+      act(TEXTS.savePicture, () => commands.savePicture()),
+      act(TEXTS.saveClip, () => void commands.saveClip()),
+      act(TEXTS.copyLink, () => void commands.copyLink()),
+      act(TEXTS.openFile, () => around.openFile()),
+      act(TEXTS.help, () => around.showHelp()),
     );
   }
 
+  #showHeadset(): void {
+    this.#headset.hidden = !(this.#isHeadsetThere && this.#canImmerse);
+  }
+
   #listen(): void {
-    const actions = this.#actions;
-    this.#timeline.addEventListener("input", () => actions.seekTo(Number(this.#timeline.value) / STEPS_PER_SECOND));
-    this.#speed.addEventListener("change", () => actions.setSpeed(Number(this.#speed.value)));
-    this.#look.addEventListener("change", () => actions.setLook(LOOKS.find((look) => look === this.#look.value)!));
-    this.#eyes.addEventListener("change", () => actions.setEyes(EYE_MODES.find((mode) => mode === this.#eyes.value)!));
-    this.#wipe.addEventListener("input", () => actions.setWipe(Number(this.#wipe.value)));
+    const commands = this.#commands;
+    this.#timeline.addEventListener("input", () => commands.seekTo(Number(this.#timeline.value) / STEPS_PER_SECOND));
+    this.#speed.addEventListener("change", () => commands.setSpeed(Number(this.#speed.value)));
+    this.#look.addEventListener("change", () => commands.change({ look: LOOKS.find((look) => look === this.#look.value)! }));
+    this.#eyes.addEventListener("change", () => commands.setEyes({ mode: EYE_MODES.find((mode) => mode === this.#eyes.value)! }));
+    this.#distance.addEventListener("input", () => commands.setEyes({ distance: Number(this.#distance.value) }));
+    this.#wipe.addEventListener("input", () => commands.change({ wipe: Number(this.#wipe.value) }));
     this.#focus.addEventListener("input", () => {
       const share = Number(this.#focus.value);
       const [low, high] = this.#range;
-      actions.setFocus(share === FOCUS_OFF ? undefined : low + ((share - 1) / 99) * (high - low));
+      commands.change({ focus: share === FOCUS_OFF ? undefined : low + ((share - 1) / 99) * (high - low) });
       this.#focus.setAttribute("aria-valuetext", share === FOCUS_OFF ? TEXTS.everythingSharp : `${share} %`);
     });
     this.#timeline.addEventListener("pointermove", (event) => void this.#showPeek(event));
@@ -216,7 +224,7 @@ export class Controls {
     this.#peek.style.left = `clamp(86px, ${100 * share}%, calc(100% - 86px))`;
     const [old] = this.#peek.getElementsByTagName("canvas");
     this.#peek.replaceChildren(...(old === undefined ? [] : [old]), timeText(seconds));
-    const picture = await this.#actions.peek(seconds);
+    const picture = await this.#commands.peek(seconds);
     if (picture === undefined || number !== this.#peeked) return;
     const canvas = element("canvas");
     [canvas.width, canvas.height] = [picture.width, picture.height];

@@ -24,15 +24,16 @@ const ICONS = {
   more: "M3 8h.01M8 8h.01M13 8h.01",
 } as const;
 
-export function icon(name: keyof typeof ICONS): SVGSVGElement {
-  const space = "http://www.w3.org/2000/svg";
-  const drawing = document.createElementNS(space, "svg");
-  drawing.setAttribute("viewBox", "0 0 16 16");
-  drawing.setAttribute("aria-hidden", "true");
-  const path = document.createElementNS(space, "path");
-  path.setAttribute("d", ICONS[name]);
-  drawing.append(path);
-  return drawing;
+export function icon(name: keyof typeof ICONS): SVGElement {
+  return drawing("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, drawing("path", { d: ICONS[name] }));
+}
+
+/** An element of SVG; colours go in as attributes, since pages may allow no inline styles. */
+export function drawing(name: string, attributes: Record<string, string> = {}, ...children: Node[]): SVGElement {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
 }
 
 export function button(label: string, content: Node | string, onClick: () => void): HTMLButtonElement {

@@ -6,19 +6,24 @@ import type { CameraFrame } from "../synthesis/camera_textures.ts";
 import type { ViewRenderer } from "../synthesis/renderer.ts";
 import type { Shown } from "./shown.ts";
 
-export const EYE_MODES = ["one", "side by side", "anaglyph"] as const;
+export const EYE_MODES = ["one", "side by side", "anaglyph", "nine"] as const;
 
-/** Whether both eyes get a picture of their own, and how far apart they are, in steps of the array. */
+/** Whether both eyes get a picture of their own (or nine views, as lenticular displays take them), and how far apart they are, in steps of the array. */
 export interface Eyes {
   readonly mode: (typeof EYE_MODES)[number];
   readonly distance: number;
 }
 
-/** Where the two eyes are: `distance` steps apart around a viewpoint, kept inside. */
-export function eyesOf(header: Header, view: Viewpoint, distance: number): [Viewpoint, Viewpoint] {
-  const half = Math.min(distance, header.cols - 1) / 2;
-  const middle = Math.min(Math.max(view.col, half), header.cols - 1 - half);
-  return [clampView(header, { row: view.row, col: middle - half }), clampView(header, { row: view.row, col: middle + half })];
+/** Most px that nine pictures have together. */
+const NINE_SIZE = [1920, 1280] as const;
+
+/** Where the eyes are: `distance` steps apart around a viewpoint, leftmost first, kept inside together. */
+export function eyesOf(header: Header, view: Viewpoint, { mode, distance }: Eyes): Viewpoint[] {
+  if (mode === "one") return [view];
+  const count = mode === "nine" ? 9 : 2;
+  const width = Math.min(distance * (count - 1), header.cols - 1);
+  const left = Math.min(Math.max(view.col - width / 2, 0), header.cols - 1 - width);
+  return Array.from({ length: count }, (_, i) => clampView(header, { row: view.row, col: left + (i * width) / (count - 1) }));
 }
 
 /** Viewpoints each way over which a picture with a focus is averaged, and how far they reach, in cells. */
@@ -41,7 +46,7 @@ export function apertureOf(header: Header, view: Viewpoint): { view: Viewpoint; 
 /** The views that `drawShown` draws. */
 export function viewsShown(header: Header, { view, eyes, focus }: Shown): Viewpoint[] {
   if (focus !== undefined) return apertureOf(header, view).map((one) => one.view);
-  return eyes.mode === "one" ? [view] : eyesOf(header, view, eyes.distance);
+  return eyesOf(header, view, eyes);
 }
 
 /** Draw what is to be shown on the canvas, with a share of the picture's size each way. */
@@ -49,12 +54,14 @@ export function drawShown(
   renderer: ViewRenderer, canvas: HTMLCanvasElement, header: Header,
   frames: readonly CameraFrame[], shown: Shown, detail: number, fine: boolean,
 ): void {
-  const width = Math.max(Math.round(header.width * detail), 1);
-  const height = Math.max(Math.round(header.height * detail), 1);
-  const isWide = shown.eyes.mode === "side by side";
-  if (canvas.width !== width * (isWide ? 2 : 1) || canvas.height !== height) {
-    canvas.width = width * (isWide ? 2 : 1);
-    canvas.height = height;
+  const { mode } = shown.eyes;
+  const [across, down] = mode === "nine" ? [3, 3] : mode === "side by side" ? [2, 1] : [1, 1];
+  const scale = mode === "nine" ? Math.min(detail, NINE_SIZE[0] / (3 * header.width), NINE_SIZE[1] / (3 * header.height)) : detail;
+  const width = Math.max(Math.round(header.width * scale), 1);
+  const height = Math.max(Math.round(header.height * scale), 1);
+  if (canvas.width !== width * across || canvas.height !== height * down) {
+    canvas.width = width * across;
+    canvas.height = height * down;
   }
   const settings = { look: shown.look, fine, dolly: shown.dolly, wipe: shown.wipe };
   const area = { x: 0, y: 0, width, height };
@@ -66,14 +73,10 @@ export function drawShown(
     });
     return;
   }
-  if (shown.eyes.mode === "one") {
-    renderer.draw(frames, shown.view, settings, area, null);
-    return;
-  }
-  const eyes = eyesOf(header, shown.view, shown.eyes.distance);
-  eyes.forEach((eye, i) => {
+  eyesOf(header, shown.view, shown.eyes).forEach((eye, i) => {
+    const place = { ...area, x: (i % across) * width, y: (down - 1 - Math.floor(i / across)) * height };
     const mask = [i === 0, i === 1, i === 1] as const; // red for the left eye, cyan for the right one
-    if (isWide) renderer.draw(frames, eye, settings, { ...area, x: i * width }, null);
-    else renderer.draw(frames, eye, { ...settings, mask }, area, null);
+    if (mode === "anaglyph") renderer.draw(frames, eye, { ...settings, mask }, area, null);
+    else renderer.draw(frames, eye, settings, place, null);
   });
 }

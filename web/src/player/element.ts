@@ -6,8 +6,10 @@ import type { Viewpoint } from "../geometry.ts";
 import type { Look, Pixels } from "../synthesis/renderer.ts";
 import { element } from "./dom.ts";
 import type { Eyes } from "./drawing.ts";
-import { Engine } from "./engine.ts";
+import type { Engine, EngineEvents } from "./engine.ts";
 import { parseView } from "./format.ts";
+import { PageEngine } from "./page_engine.ts";
+import { ServerEngine } from "./server_engine.ts";
 import type { Opening } from "./shown.ts";
 import styles from "./style.css";
 import { TEXTS } from "./texts.ts";
@@ -56,7 +58,7 @@ export class MvcodecPlayer extends HTMLElement {
     super();
     const root = this.attachShadow({ mode: "open" });
     root.adoptedStyleSheets = [SHEET];
-    this.#ui = new Ui(this, root, this.#canvas, (from) => void this.open(from).catch(() => {}));
+    this.#ui = new Ui(this, root, (from) => void this.open(from).catch(() => {}));
   }
 
   connectedCallback(): void {
@@ -85,21 +87,8 @@ export class MvcodecPlayer extends HTMLElement {
 
   /** Show a file: its address, or one that the page has. Resolves as `ready` does. */
   open(from: string | Blob, at: Opening = {}): Promise<void> {
-    this.#engine?.close();
-    const engine = new Engine(this.#canvas, {
-      onFrame: () => {
-        this.#ui.drawn();
-        const detail: FrameDetail = { frame: engine.frame, seconds: engine.timeOf(engine.frame), view: engine.view };
-        this.dispatchEvent(new CustomEvent("frame", { detail }));
-      },
-      onState: () => this.#ui.update(),
-      onWaiting: (isWaiting) => this.#ui.wait(isWaiting ? TEXTS.waitingPicture : undefined),
-      onTrouble: (message, isFatal) => this.#tell({ message, isFatal }),
-    });
-    this.#engine = engine;
-    this.#ui.attach(engine);
-    this.#ui.wait(TEXTS.waitingFile);
-    this.#ready = this.#start(engine, from, at);
+    const engine = this.#attach((events) => new PageEngine(this.#canvas, events));
+    this.#ready = this.#start(engine, at, () => this.#read(engine, from, at));
     return this.#ready;
   }
 
@@ -149,6 +138,7 @@ export class MvcodecPlayer extends HTMLElement {
   #openFirst(): void {
     const isPage = this.hasAttribute("page");
     const asked = isPage ? new URLSearchParams(location.search) : new URLSearchParams();
+    const server = this.getAttribute("server");
     const at = {
       seconds: Math.max(Number(asked.get("t") ?? 0) || 0, 0),
       view: parseView(asked.get("view") ?? this.getAttribute("view")),
@@ -158,6 +148,7 @@ export class MvcodecPlayer extends HTMLElement {
     const src = asked.get("src") ?? this.getAttribute("src");
     if (embedded !== null) void this.#openEmbedded(embedded.textContent ?? "", at).catch(() => {});
     else if (src !== null) void this.open(src, at).catch(() => {});
+    else if (server !== null) void this.#serve(server, at).catch(() => {});
     else this.#ui.fail(TEXTS.noFile);
   }
 
@@ -168,12 +159,42 @@ export class MvcodecPlayer extends HTMLElement {
     return this.#ready;
   }
 
-  async #start(engine: Engine, from: string | Blob, at: Opening): Promise<void> {
+  /** Show what a server renders; `address`: of its WebSocket. */
+  #serve(address: string, at: Opening): Promise<void> {
+    const engine = this.#attach((events) => new ServerEngine(new URL(address, location.href), events));
+    this.#ready = this.#start(engine, at, () => engine.open(at));
+    return this.#ready;
+  }
+
+  /** Put an engine in the place of the one that there is. */
+  #attach<E extends Engine>(make: (events: EngineEvents) => E): E {
+    this.#engine?.close();
+    const engine: E = make({
+      onFrame: () => {
+        this.#ui.drawn();
+        const detail: FrameDetail = { frame: engine.frame, seconds: engine.timeOf(engine.frame), view: engine.view };
+        this.dispatchEvent(new CustomEvent("frame", { detail }));
+      },
+      onState: () => this.#ui.update(),
+      onWaiting: (what) => this.#ui.wait(what),
+      onTrouble: (message, isFatal) => this.#tell({ message, isFatal }),
+    });
+    this.#engine = engine;
+    this.#ui.attach(engine);
+    this.#ui.wait(TEXTS.waitingFile);
+    return engine;
+  }
+
+  async #read(engine: PageEngine, from: string | Blob, at: Opening): Promise<void> {
+    if (!("VideoDecoder" in globalThis)) throw new Error(TEXTS.noWebCodecs);
+    const source: Source | string =
+      typeof from !== "string" ? new BlobSource(from) : isLiveAddress(from) ? from : await HttpSource.open(from);
+    await engine.open(source, at);
+  }
+
+  async #start(engine: Engine, at: Opening, open: () => Promise<void>): Promise<void> {
     try {
-      if (!("VideoDecoder" in globalThis)) throw new Error(TEXTS.noWebCodecs);
-      const source: Source | string =
-        typeof from !== "string" ? new BlobSource(from) : isLiveAddress(from) ? from : await HttpSource.open(from);
-      await engine.open(source, at);
+      await open();
     } catch (error) {
       if (engine === this.#engine) this.#tell({ message: (error as Error).message, isFatal: true });
       throw error;

@@ -1,17 +1,18 @@
 /** Controls that hide when nothing happens for a while. */
 
-import type { Controls } from "./controls.ts";
-
 const IDLE_MS = 3000;
 
 export class Idle {
   readonly #stage: HTMLElement;
-  readonly #controls: Controls;
+  readonly #bars: readonly HTMLElement[];
+  readonly #menu: HTMLElement;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(stage: HTMLElement, controls: Controls) {
+  /** `bars` stay while they are pointed at, or have the focus from the keyboard, and all while the menu is open. */
+  constructor(stage: HTMLElement, bars: readonly HTMLElement[], menu: HTMLElement) {
     this.#stage = stage;
-    this.#controls = controls;
+    this.#bars = bars;
+    this.#menu = menu;
   }
 
   /** Something has happened. */
@@ -26,8 +27,7 @@ export class Idle {
   }
 
   #begin(): void {
-    const { bar, menu } = this.#controls;
-    const hasFocus = bar.matches(":focus-within") && bar.querySelector(":focus-visible") !== null;
-    if (!hasFocus && menu.hidden && !bar.matches(":hover")) this.#stage.classList.add("idle");
+    const isUsed = this.#bars.some((bar) => bar.matches(":hover") || bar.querySelector(":focus-visible") !== null);
+    if (!isUsed && this.#menu.hidden) this.#stage.classList.add("idle");
   }
 }

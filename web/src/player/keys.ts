@@ -1,39 +1,40 @@
 /** Which key does what; `KEYS` of the texts lists them for people. */
 
 import { button, element } from "./dom.ts";
-import { SPEEDS } from "./playback.ts";
 import { KEYS, TEXTS } from "./texts.ts";
 import type { Ui } from "./ui.ts";
 
-export function keyActions(ui: Ui): ReadonlyMap<string, () => void> {
-  const nextSpeed = (by: number) => {
-    const place = SPEEDS.findIndex((speed) => speed >= ui.speed);
-    ui.changeSpeed(SPEEDS[Math.min(Math.max(place + by, 0), SPEEDS.length - 1)]);
-  };
-  return new Map([
-    [" ", () => ui.togglePlay()],
-    ["k", () => ui.togglePlay()],
-    ["ArrowLeft", () => ui.looking.key(0, -1)],
-    ["ArrowRight", () => ui.looking.key(0, 1)],
-    ["ArrowUp", () => ui.looking.key(-1, 0)],
-    ["ArrowDown", () => ui.looking.key(1, 0)],
-    [",", () => ui.step(-1)],
-    [".", () => ui.step(1)],
-    ["j", () => ui.skip(-1)],
-    ["l", () => ui.skip(1)],
-    ["Home", () => ui.seekTo(0)],
-    ["End", () => ui.seekTo(Infinity)],
-    ["+", () => nextSpeed(1)],
-    ["-", () => nextSpeed(-1)],
-    ["a", () => ui.markSection("from")],
-    ["b", () => ui.markSection("to")],
-    ["v", () => ui.nextLook()],
-    ["e", () => ui.nextEyes()],
-    ["w", () => ui.dolly(0.2)],
-    ["s", () => ui.dolly(-0.2)],
-    ["h", () => ui.toggleHover()],
-    ["p", () => ui.savePicture()],
-    ["c", () => void ui.copyLink()],
+/** `isFar`: with the shift key. */
+export function keyActions(ui: Ui): ReadonlyMap<string, (isFar: boolean) => void> {
+  const { commands } = ui;
+  const { looking } = commands;
+  return new Map<string, (isFar: boolean) => void>([
+    [" ", () => commands.togglePlay()],
+    ["k", () => commands.togglePlay()],
+    ["ArrowLeft", (isFar) => looking.key(0, -1, isFar)],
+    ["ArrowRight", (isFar) => looking.key(0, 1, isFar)],
+    ["ArrowUp", (isFar) => looking.key(-1, 0, isFar)],
+    ["ArrowDown", (isFar) => looking.key(1, 0, isFar)],
+    ["g", () => looking.goToNearest()],
+    [",", () => commands.step(-1)],
+    [".", () => commands.step(1)],
+    ["j", () => commands.skip(-1)],
+    ["l", () => commands.skip(1)],
+    ["Home", () => commands.seekTo(0)],
+    ["End", () => commands.seekTo(Infinity)],
+    ["+", () => commands.changeSpeed(1)],
+    ["-", () => commands.changeSpeed(-1)],
+    ["a", () => commands.markSection("from")],
+    ["b", () => commands.markSection("to")],
+    ["v", () => commands.nextLook()],
+    ["e", () => commands.nextEyes()],
+    ["[", () => commands.changeEyes(-1)],
+    ["]", () => commands.changeEyes(1)],
+    ["w", () => commands.dolly(0.2)],
+    ["s", () => commands.dolly(-0.2)],
+    ["h", () => commands.toggleHover()],
+    ["p", () => commands.savePicture()],
+    ["c", () => void commands.copyLink()],
     ["o", () => ui.openFile()],
     ["f", () => ui.toggleFullscreen()],
     ["i", () => ui.toggleStatistics()],

@@ -9,8 +9,9 @@ const DRAG_CELLS = 1.2;
 /** Share of the array that hovering from edge to edge, or turning a phone by 45 degrees, looks around. */
 const HOVER_SHARE = 0.3;
 const TURN_DEGREES = 45;
-/** Cells that a key looks around. */
+/** Cells that a key looks around, and with shift. */
 const KEY_CELLS = 0.125;
+const FAR_KEY_CELLS = 1;
 
 export class Looking {
   /** The pointer is followed without being pressed. */
@@ -24,6 +25,7 @@ export class Looking {
   attach(engine: Engine, sways: boolean): void {
     this.#engine = engine;
     this.#home = engine.shown.view;
+    this.hovers = engine.isLight;
     this.#swaySince = sways ? performance.now() : undefined;
     if (sways) requestAnimationFrame((now) => this.#sway(now));
   }
@@ -38,8 +40,20 @@ export class Looking {
     this.#move(-down * DRAG_CELLS, -across * DRAG_CELLS);
   }
 
-  key(down: number, across: number): void {
-    this.#move(down * KEY_CELLS, across * KEY_CELLS);
+  key(down: number, across: number, isFar: boolean): void {
+    const cells = isFar ? FAR_KEY_CELLS : KEY_CELLS;
+    this.#move(down * cells, across * cells);
+  }
+
+  go(view: Viewpoint): void {
+    void this.#engine?.look(view);
+    this.#home = this.#engine?.shown.view ?? view;
+  }
+
+  /** To the nearest place of the array. */
+  goToNearest(): void {
+    const view = this.#engine?.shown.view;
+    if (view !== undefined) this.go({ row: Math.round(view.row), col: Math.round(view.col) });
   }
 
   /** The pointer hovers, by shares of the picture from its middle. */
@@ -57,8 +71,7 @@ export class Looking {
     const { view } = engine.shown;
     const cell = (places: readonly number[]) => (places.length > 1 ? places[1] - places[0] : 0);
     const { realRows, realCols } = engine.header;
-    void engine.look({ row: view.row + down * cell(realRows), col: view.col + across * cell(realCols) });
-    this.#home = engine.shown.view;
+    this.go({ row: view.row + down * cell(realRows), col: view.col + across * cell(realCols) });
   }
 
   #peer(right: number, down: number): void {

@@ -68,7 +68,7 @@ export function psnr({ width, height, data }: Pixels, original: ImageData): numb
   return squares === 0 ? MOST_DB : 10 * Math.log10((255 ** 2 * width * height) / squares);
 }
 
-async function pixelsOf(blob: Blob): Promise<ImageData> {
+export async function pixelsOf(blob: Blob): Promise<ImageData> {
   const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none" });
   const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d")!;
   context.drawImage(bitmap, 0, 0);

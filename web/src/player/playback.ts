@@ -1,5 +1,7 @@
 /** Which time of the recording is due: play, pause, speed, and a loop between two times. All in seconds. */
 
+import type { Section } from "./section.ts";
+
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const;
 
 export class Playback {
@@ -8,7 +10,7 @@ export class Playback {
   loops = true;
   speed = 1;
   /** What is played over and over; undefined: everything. */
-  section: { from: number; to: number } | undefined;
+  section: Section | undefined;
   #end = 0;
   #at = 0;
   #since: number | undefined;

@@ -17,6 +17,10 @@ export interface Shown {
   focus: number | undefined;
 }
 
+export function shownFirst(): Shown {
+  return { frame: 0, view: { row: 0, col: 0 }, look: "picture", dolly: 0, eyes: { mode: "one", distance: 0.5 }, wipe: 0, focus: undefined };
+}
+
 /** What is really shown: originals are of places of the array, so what is compared with one is one sharp view from the nearest of those. */
 export function placed(shown: Shown): Shown {
   if (shown.look !== "difference") return shown;
@@ -31,16 +35,4 @@ export interface Opening {
   readonly view?: Viewpoint | undefined;
   /** See `Originals`. */
   readonly originals?: string | undefined;
-}
-
-/** Told to whoever shows the controls. */
-export interface EngineEvents {
-  /** Another picture is on the screen. */
-  onFrame(): void;
-  /** Playback, loop or the file's length changed. */
-  onState(): void;
-  /** A picture has been waited for a while; false: it has come. */
-  onWaiting(isWaiting: boolean): void;
-  /** Something is wrong with the file; it goes on where `isFatal` is false. */
-  onTrouble(text: string, isFatal: boolean): void;
 }

@@ -36,13 +36,13 @@ async function saveClip(canvas: HTMLCanvasElement, seconds: number, name: string
   save(new Blob(parts, { type: recorder.mimeType }), `${name}.${recorder.mimeType.includes("mp4") ? "mp4" : "webm"}`);
 }
 
-/** Play the loop, or else everything, once, and offer what a canvas shows meanwhile. */
-export async function saveLoop(engine: Engine, canvas: HTMLCanvasElement): Promise<void> {
+/** Play the loop, or else everything, once, and offer what the canvas shows meanwhile. */
+export async function saveLoop(engine: Engine): Promise<void> {
   const { header, playback } = engine;
   const { from, to } = playback.section ?? { from: 0, to: engine.timeOf(engine.count - 1) + 1 / header.fps };
   await engine.seek(engine.frameAt(from));
   engine.play();
-  await saveClip(canvas, Math.max((to - from) / playback.speed, 0.2), header.name || "view");
+  await saveClip(engine.canvas, Math.max((to - from) / playback.speed, 0.2), header.name || "view");
 }
 
 /** The page's address with a view and a time, which leads back to them. */

@@ -19,6 +19,8 @@ export const TEXTS = {
   noHeadset: (reason: string) => `The headset cannot be used: ${reason}`,
   tilt: "Turn the phone to look around",
   tiltRefused: "This phone does not let pages know how it is turned; its browser's settings may allow it",
+  map: "Viewpoint on the camera array",
+  place: (row: number, col: number) => `row ${row.toFixed(2)}, column ${col.toFixed(2)}`,
   help: "Keys",
   close: "Close",
   dismiss: "Dismiss",
@@ -35,6 +37,13 @@ export const TEXTS = {
     `${count} of this file's cameras are coded from the others, which browsers cannot decode: the nearest of the other cameras is shown. ` +
     "mvcodec play --renderer server shows all views",
   enhanced: (count: number) => `This file has ${count} enhanced views: this page shows them as synthesised`,
+  serverGone: "The server is gone. Trying again",
+  serverRefuses: (reason: string) => `The server refuses: ${reason}. Trying again`,
+  notDrawn: (frame: number, reason: string) => `Frame ${frame} cannot be drawn: ${reason}`,
+  damage: (frame: number, seconds: number, until: number | null, reason: string) =>
+    `Damage: frame ${frame} cannot be decoded (from ${seconds.toFixed(3)} s ${until === null ? "to the end" : `until ${until.toFixed(3)} s`}); ` +
+    `the nearest whole one is shown. ${reason}`,
+  noHeadsetHere: "this server's pictures are for screens",
   noWebCodecs:
     "This page may not decode video here: browsers allow it on https:// and on this machine only. Try mvcodec play --renderer server",
   disparity: (px: number, metres: number | undefined) =>
@@ -56,11 +65,13 @@ export const TEXTS = {
     difference: "Blue: none, yellow: a quarter of the range or more",
   },
   noOriginal: (address: string) => `There is no original here, or one of another size: ${address}`,
+  quality: (db: number, ssim: number | null) => `${TEXTS.psnr(db)}${ssim === null ? "" : `, SSIM ${ssim.toFixed(4)}`}`,
   psnr: (db: number) => `${db.toFixed(2)} dB PSNR (luma) against the original`,
-  eyes: { one: "One view", "side by side": "Side by side", anaglyph: "Red-cyan" },
+  eyes: { one: "One view", "side by side": "Side by side", anaglyph: "Red-cyan", nine: "Nine views" },
   follows: "The view follows the pointer",
   followsNot: "The view does not follow the pointer",
   views: "Eyes",
+  distance: "Distance of the eyes",
   wipe: "Compare with the picture",
   focus: "Focus",
   everythingSharp: "everything",
@@ -69,14 +80,16 @@ export const TEXTS = {
 /** Key -> what it does, for the list of keys. */
 export const KEYS: readonly (readonly [string, string])[] = [
   ["Space k", "play, pause"],
-  ["← → ↑ ↓", "look around"],
+  ["← → ↑ ↓", "look around; with shift: by a whole cell"],
+  ["g", "to the nearest place of the array"],
   [", .", "one frame back, on"],
   ["j l", "some seconds back, on"],
   ["Home End", "first frame, last frame"],
   ["+ -", "faster, slower"],
   ["a b", "loop from here, to here; again: off"],
   ["v", "what is shown"],
-  ["e", "one view, side by side, red-cyan"],
+  ["e", "one view, side by side, red-cyan, nine views"],
+  ["[ ]", "eyes nearer, farther apart"],
   ["w s", "move ahead, back"],
   ["h", "follow the pointer, or not"],
   ["p", "save the picture"],

@@ -4,7 +4,7 @@ import type { Header } from "../container/header.ts";
 import type { Camera } from "../geometry.ts";
 import type { Planes } from "../decode/planes.ts";
 import fullShader from "./full.vert.glsl";
-import { ArrayTexture, makeProgram, type Program } from "./gl.ts";
+import { ArrayTexture, programOf, type Program } from "./gl.ts";
 import prepareShader from "./prepare.frag.glsl";
 
 /** The cameras of a cell. */
@@ -44,13 +44,18 @@ export class CameraTextures {
     this.#header = header;
     const { width, height, mapScale } = header;
     const [halfWidth, halfHeight] = [Math.ceil(width / 2), Math.ceil(height / 2)];
-    this.#prepare = makeProgram(gl, fullShader, prepareShader);
+    this.#prepare = programOf(gl, fullShader, prepareShader);
     this.luma = new ArrayTexture(gl, 1, 2 * halfWidth, 2 * halfHeight, SLOTS);
     this.chroma = new ArrayTexture(gl, 2, halfWidth, halfHeight, SLOTS);
     this.maps = new ArrayTexture(gl, 1, Math.ceil(width / mapScale), Math.ceil(height / mapScale), SLOTS);
     this.pixels = new ArrayTexture(gl, 4, width, height, SLOTS);
     this.#pairs = new Uint8Array(2 * halfWidth * halfHeight);
     this.#layerTarget = gl.createFramebuffer();
+  }
+
+  delete(): void {
+    for (const texture of [this.luma, this.chroma, this.maps, this.pixels]) texture.delete();
+    this.#gl.deleteFramebuffer(this.#layerTarget);
   }
 
   /** Make these cameras ready, four at most; returns each one's layer. What is there already stays. */

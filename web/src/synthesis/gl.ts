@@ -1,7 +1,24 @@
 /** Small things about WebGL 2 that its API says at length. */
 
-/** Compile and link. Throws Error with the driver's own words. */
-export function makeProgram(gl: WebGL2RenderingContext, vertex: string, fragment: string): Program {
+/** What each context has compiled: without a GPU that takes half a second of its processor. */
+const COMPILED = new WeakMap<WebGL2RenderingContext, Map<string, Program>>();
+
+/** The program of two shaders, compiled once. Throws Error with the driver's own words. */
+export function programOf(gl: WebGL2RenderingContext, vertex: string, fragment: string): Program {
+  const compiled = COMPILED.get(gl) ?? new Map<string, Program>();
+  COMPILED.set(gl, compiled);
+  const key = `${vertex}\0${fragment}`;
+  const program = compiled.get(key) ?? makeProgram(gl, vertex, fragment);
+  compiled.set(key, program);
+  return program;
+}
+
+/** The context was lost, and with it what it has compiled. */
+export function forgetPrograms(gl: WebGL2RenderingContext): void {
+  COMPILED.delete(gl);
+}
+
+function makeProgram(gl: WebGL2RenderingContext, vertex: string, fragment: string): Program {
   const program = gl.createProgram();
   for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]] as const) {
     const shader = gl.createShader(kind)!;
@@ -49,10 +66,6 @@ export class Program {
       this.#places.set(name, place);
     }
     return place;
-  }
-
-  delete(): void {
-    this.#gl.deleteProgram(this.#program);
   }
 }
 
@@ -109,6 +122,10 @@ export class ArrayTexture implements Bindable {
   bind(unit: number): void {
     this.#gl.activeTexture(this.#gl.TEXTURE0 + unit);
     this.#gl.bindTexture(this.#gl.TEXTURE_2D_ARRAY, this.texture);
+  }
+
+  delete(): void {
+    this.#gl.deleteTexture(this.texture);
   }
 }
 

@@ -7,7 +7,7 @@ import { CameraTextures, SLOTS, type CameraFrame } from "./camera_textures.ts";
 import copyFragment from "./copy.frag.glsl";
 import { Draft, type DraftCamera } from "./draft.ts";
 import fullVertex from "./full.vert.glsl";
-import { framebufferOf, makeProgram, Texture, type Program } from "./gl.ts";
+import { framebufferOf, programOf, Texture, type Program } from "./gl.ts";
 import searchShader from "./search.glsl";
 import viewFragment from "./view.frag.glsl";
 
@@ -84,10 +84,10 @@ export class ViewRenderer {
     this.#bounds = new Bounds(header);
     this.#near = new Texture(this.gl, 4, this.#bounds.across, this.#bounds.down);
     this.#far = new Texture(this.gl, 4, this.#bounds.across, this.#bounds.down);
-    this.#view = makeProgram(this.gl, fullVertex, searchShader + viewFragment);
+    this.#view = programOf(this.gl, fullVertex, searchShader + viewFragment);
     this.#originalTexture = new Texture(this.gl, 4, header.width, header.height);
     this.#draft = new Draft(header);
-    this.#copy = makeProgram(this.gl, fullVertex, copyFragment);
+    this.#copy = programOf(this.gl, fullVertex, copyFragment);
     this.#draftTexture = new Texture(this.gl, 4, header.width, header.height);
   }
 
@@ -145,6 +145,12 @@ export class ViewRenderer {
     gl.deleteFramebuffer(target);
     texture.delete();
     return { width, height, data };
+  }
+
+  /** Let go of what the GPU holds; programs stay for the next one. */
+  delete(): void {
+    for (const texture of [this.#near, this.#far, this.#originalTexture, this.#draftTexture]) texture.delete();
+    this.#cameras.delete();
   }
 
   #drawDraft(cameras: readonly DraftCamera[], settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {

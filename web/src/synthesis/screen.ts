@@ -3,7 +3,7 @@
 import type { Header } from "../container/header.ts";
 import type { Viewpoint } from "../geometry.ts";
 import type { CameraFrame } from "./camera_textures.ts";
-import { framebufferOf, makeProgram, Texture, type Program } from "./gl.ts";
+import { framebufferOf, programOf, Texture, type Program } from "./gl.ts";
 import type { Area, ViewRenderer, ViewSettings } from "./renderer.ts";
 import screenFragment from "./screen.frag.glsl";
 import screenVertex from "./screen.vert.glsl";
@@ -31,7 +31,7 @@ export class Screen {
   constructor(renderer: ViewRenderer, header: Header) {
     this.#renderer = renderer;
     this.#header = header;
-    this.#program = makeProgram(renderer.gl, screenVertex, screenFragment);
+    this.#program = programOf(renderer.gl, screenVertex, screenFragment);
     this.#picture = new Texture(renderer.gl, 4, header.width, header.height);
     this.#pictureTarget = framebufferOf(renderer.gl, this.#picture);
   }
@@ -61,6 +61,5 @@ export class Screen {
   delete(): void {
     this.#renderer.gl.deleteFramebuffer(this.#pictureTarget);
     this.#picture.delete();
-    this.#program.delete();
   }
 }
