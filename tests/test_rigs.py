@@ -224,22 +224,57 @@ def test_pictures_between_pixels_keep_their_finest_detail_and_their_flat_parts()
         assert abs(inside.mean() - line.mean()) < 1
 
 
+def matched(pictures: dict[Position, Picture]) -> Rectifier:
+    """Of cameras in a row that see each point at the same place of their pictures, by 500 points."""
+    draw = np.random.default_rng(4)
+    places = draw.uniform(10, 180, (500, 1, 2)).repeat(len(pictures), axis=1)
+    seen = np.ones(places.shape[:2], bool)
+    tracks = Tracks(tuple(pictures), places, seen, np.zeros(500, np.int64))
+    cameras = {at: a_camera((0, 0, 0), at) for at in pictures}
+    rig = Rig(1, len(pictures), SIZE, cameras, Rectified(*SIZE, 320.0, (159.5, 99.5)), "scene", {})
+    return Rectifier(matched_colours(rig, tracks, [FrameSet(0, 0, pictures)]))
+
+
+def soft_noise(low: float, high: float) -> Vectors:
+    """(H, W, 3): something to compare colours by."""
+    draw = np.random.default_rng(4)
+    noise = cv2.GaussianBlur(draw.integers(0, 256, (*SIZE[::-1], 3), np.uint8), (0, 0), 3)
+    return np.clip((noise.astype(float) - 128) * 3 + 120, low, high)
+
+
 def test_gains_and_offsets_are_taken_out() -> None:
     """Two cameras show the same picture, one of them dimmer and lifted."""
-    draw = np.random.default_rng(4)
-    picture = cv2.GaussianBlur(draw.integers(0, 256, (*SIZE[::-1], 3), np.uint8), (0, 0), 3)
-    picture = np.clip((picture.astype(float) - 128) * 3 + 120, 20, 230)
+    light = soft_noise(20, 230)
     pictures: dict[Position, Picture] = {
-        (0, 0): picture.astype(np.uint8),
-        (0, 1): np.rint(picture * 0.8 + 3).astype(np.uint8),
+        (0, 0): light.astype(np.uint8),
+        (0, 1): np.rint(light * 0.8 + 3).astype(np.uint8),
     }
-    places = draw.uniform(10, 180, (500, 1, 2)).repeat(2, axis=1)
-    tracks = Tracks(((0, 0), (0, 1)), places, np.ones((500, 2), bool), np.zeros(500, np.int64))
-    cameras = {at: a_camera((0, 0, 0), at) for at in pictures}
-    rig = Rig(1, 2, SIZE, cameras, Rectified(*SIZE, 320.0, (159.5, 99.5)), "scene", {})
-    rectifier = Rectifier(matched_colours(rig, tracks, [FrameSet(0, 0, pictures)]))
+    rectifier = matched(pictures)
     one, other = (rectifier.picture(at, pictures[at]).astype(int) for at in pictures)
     assert np.abs(one - other).mean() < 1.0
+
+
+def test_what_is_white_to_the_brightest_camera_becomes_white_for_all() -> None:
+    light = soft_noise(20, 200)
+    light[150:] = 290.0
+    pictures: dict[Position, Picture] = {
+        (0, col): np.clip(np.rint(light * gain), 0, 255).astype(np.uint8)
+        for col, gain in enumerate((0.8, 1.0, 0.85))
+    }
+    rectifier = matched(pictures)
+    for at, picture in pictures.items():
+        assert rectifier.picture(at, picture)[160:].mean() > 250
+
+
+def test_one_camera_that_is_far_too_bright_does_not_make_all_so() -> None:
+    light = soft_noise(20, 110)
+    pictures: dict[Position, Picture] = {
+        (0, col): np.rint(light * gain).astype(np.uint8) for col, gain in enumerate((1, 1, 1, 2.0))
+    }
+    rectifier = matched(pictures)
+    mean = 2**0.25
+    for at, picture in pictures.items():
+        assert rectifier.picture(at, picture).mean() == pytest.approx(1.25 * mean * light.mean(), rel=0.02)
 
 
 EUROC = """%YAML:1.0

@@ -29,12 +29,16 @@ GAIN, OFFSET = 0.3, 3.0
 FEWEST = 30
 """Points that a camera must share for its colours to be matched."""
 
+MOST_BRIGHTER = 1.25
+"""One camera that is far too bright shall not make all of them so."""
+
 
 def matched_colours(rig: Rig, tracks: Tracks, frame_sets: Sequence[FrameSet]) -> Rig:
     """The rig with gains and offsets by which its cameras agree about the colours of points.
 
-    The gains' geometric mean over the cameras is 1, the offsets' mean 0. A camera that shares fewer than
-    FEWEST points keeps its colours.
+    They become as bright as the brightest one, or MOST_BRIGHTER times their geometric mean: what is white to
+    that camera would be grey if it were made darker, and would still be white in the others' pictures. The
+    offsets' mean is 0. A camera that shares fewer than FEWEST points keeps its colours.
 
     Args:
         rig: its cameras are those of the tracks.
@@ -52,8 +56,9 @@ def matched_colours(rig: Rig, tracks: Tracks, frame_sets: Sequence[FrameSet]) ->
         usable &= usable.sum(axis=1, keepdims=True) >= 2
         if usable.any():
             gains[:, channel], offsets[:, channel] = _solved(values, usable)
+    brighter = min(max(1 / gains.mean(axis=1).min(), 1.0), MOST_BRIGHTER)
     for number, at in enumerate(tracks.cameras):
-        cameras[at] = replace(cameras[at], gain=gains[number], offset=offsets[number])
+        cameras[at] = replace(cameras[at], gain=brighter * gains[number], offset=brighter * offsets[number])
     return replace(rig, cameras=cameras)
 
 
