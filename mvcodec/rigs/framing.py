@@ -112,8 +112,7 @@ def _common(
     grid = np.stack(np.meshgrid(x, y), axis=-1)
     seen = np.ones(grid.shape[:2], bool)
     for at, camera in cameras.items():
-        there = source_places(camera, at, plane, grid.reshape(-1, 2))
-        inside = ((there >= 0) & (there <= np.array(source_size) - 1)).all(axis=1)
+        inside = _inside(camera, at, source_size, plane, grid.reshape(-1, 2))
         seen &= inside.reshape(seen.shape)
     box = _all_true_box(seen, int(middle[0] / step), int(middle[1] / step))
     if (
@@ -124,13 +123,49 @@ def _common(
         raise NothingInCommon(
             "the cameras see less than a tenth of their pictures in common; turn them to the same things"
         )
-    left, top, right, bottom = x[box[0]], y[box[1]], x[box[2]], y[box[3]]
+    sides = _grown(cameras, source_size, plane, (x[box[0]], y[box[1]], x[box[2]], y[box[3]]), step)
+    left, top, right, bottom = sides
     if size is not None:
         aspect = size[0] / size[1]
         spare_x = max((right - left + 1) - (bottom - top + 1) * aspect, 0) / 2
         spare_y = max((bottom - top + 1) - (right - left + 1) / aspect, 0) / 2
         left, right, top, bottom = left + spare_x, right - spare_x, top + spare_y, bottom - spare_y
     return float(np.ceil(left)), float(np.ceil(top)), float(np.floor(right)), float(np.floor(bottom))
+
+
+def _inside(
+    camera: RigCamera,
+    at: Position,
+    source_size: tuple[int, int],
+    plane: Rectified,
+    pixels: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """(N,): which pixels (N, 2) of the plane a camera sees."""
+    there = source_places(camera, at, plane, pixels)
+    return np.asarray(((there >= 0) & (there <= np.array(source_size) - 1)).all(axis=1))
+
+
+def _grown(
+    cameras: Mapping[Position, RigCamera],
+    source_size: tuple[int, int],
+    plane: Rectified,
+    sides: tuple[float, float, float, float],
+    step: float,
+) -> tuple[float, float, float, float]:
+    """A box whose sides (left, top, right, bottom) all cameras see, larger by up to `step`, to a pixel."""
+    grown = list(sides)
+    while step > 1:
+        step /= 2
+        for number, outwards in enumerate((-step, -step, step, step)):
+            tried = grown.copy()
+            tried[number] += outwards
+            along, across = (1, 0) if number % 2 == 0 else (0, 1)
+            line = np.empty((int(tried[along + 2] - tried[along]) + 2, 2))
+            line[:, along] = np.linspace(tried[along], tried[along + 2], len(line))
+            line[:, across] = tried[number]
+            if all(_inside(camera, at, source_size, plane, line).all() for at, camera in cameras.items()):
+                grown = tried
+    return grown[0], grown[1], grown[2], grown[3]
 
 
 def _all_true_box(seen: NDArray[np.bool_], x: int, y: int) -> tuple[int, int, int, int] | None:
