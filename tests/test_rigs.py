@@ -239,7 +239,7 @@ def soft_noise(low: float, high: float) -> Vectors:
     """(H, W, 3): something to compare colours by."""
     draw = np.random.default_rng(4)
     noise = cv2.GaussianBlur(draw.integers(0, 256, (*SIZE[::-1], 3), np.uint8), (0, 0), 3)
-    return np.clip((noise.astype(float) - 128) * 3 + 120, low, high)
+    return np.asarray(np.clip((noise.astype(float) - 128) * 3 + 120, low, high))
 
 
 def test_gains_and_offsets_are_taken_out() -> None:

@@ -91,6 +91,8 @@ class Measured:
         angle_deg: median error of the cameras' directions, up to one common rotation.
         rows, columns: residuals of new matches in the rectified pictures.
         views_db, ideal_db: mean luma PSNR of virtual views against rendered truth, and the ideal rig's.
+        in_place_db: the same of ideal cameras in the place of the rectified ones: of what is left of the
+            scene, at the rectified pictures' scale.
         cpu_s: of finding the rig, all threads.
     """
 
@@ -101,6 +103,7 @@ class Measured:
     columns: Spread
     views_db: float
     ideal_db: float
+    in_place_db: float
     cpu_s: float
 
 
@@ -139,14 +142,16 @@ def measure(
     straight = RectifiedSource(source, Rectifier(found.rig))
     tracks, _ = find_tracks(list(straight.frame_sets(slice(1, 2))), straight.array.positions)
     residuals = residuals_of(tracks, straight.array.rho)
+    views_db, in_place_db = _views_db(straight, scene, found)
     return Measured(
         seed,
         f"{grid[0]}x{grid[1]}",
         float(np.median(angle_errors_deg(found.rig, scene.cameras))),
         residuals.rows,
         residuals.columns,
-        _views_db(straight, scene, found),
+        views_db,
         ideal_db,
+        in_place_db,
         after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
     )
 
@@ -155,25 +160,34 @@ def ideal_db(grid: tuple[int, int]) -> float:
     """Mean luma PSNR of the virtual views of the ideal rig."""
     room = RoomScene(SceneSettings(grid, FRAMES))
     truths = {viewpoint: room.render(viewpoint, 1)[0] for viewpoint in _viewpoints(grid)}
-    return _coded_db(SceneSource(room), truths)
-
-
-def _views_db(straight: RectifiedSource, scene: RoughScene, found: Calibrated) -> float:
-    optics, turn = true_rectified_camera(found.rig, scene)
-    truths = {}
-    for viewpoint in _viewpoints((scene.array.rows, scene.array.cols)):
-        place = (viewpoint.col, viewpoint.row, 0.0)
-        truths[viewpoint], _ = scene.room.look(place, 1, optics, turn)
-    return _coded_db(straight, truths)
-
-
-def _coded_db(source: SceneSource | RectifiedSource, truths: Mapping[Viewpoint, Picture]) -> float:
-    """Mean luma PSNR of views of the middle frame, coded as `mvcodec encode` does by default."""
-    array = source.array
+    source = SceneSource(room)
     (frame_set,) = source.frame_sets(slice(1, 2))
+    return _coded_db(source.array, frame_set.pictures, truths)
+
+
+def _views_db(straight: RectifiedSource, scene: RoughScene, found: Calibrated) -> tuple[float, float]:
+    """`views_db` and `in_place_db`."""
+    optics, turn = true_rectified_camera(found.rig, scene)
+
+    def seen(row: float, col: float) -> Picture:
+        return scene.room.look((col, row, 0.0), 1, optics, turn)[0]
+
+    truths = {at: seen(at.row, at.col) for at in _viewpoints((scene.array.rows, scene.array.cols))}
+    (frame_set,) = straight.frame_sets(slice(1, 2))
+    in_place = {(row, col): seen(row, col) for row, col in straight.array.positions}
+    return (
+        _coded_db(straight.array, frame_set.pictures, truths),
+        _coded_db(straight.array, in_place, truths),
+    )
+
+
+def _coded_db(
+    array: CameraArray, pictures: Mapping[Position, Picture], truths: Mapping[Viewpoint, Picture]
+) -> float:
+    """Mean luma PSNR of views of one frame set, coded as `mvcodec encode` does by default."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "rig.mcap"
-        mvcodec.encode([frame_set.pictures], path, calibration=array.calibration, rho=array.rho)
+        mvcodec.encode([pictures], path, calibration=array.calibration, rho=array.rho)
         with mvcodec.open(path) as video:
             views = {at: video.render(at.row, at.col) for at in truths}
     return float(np.mean([_registered_db(truths[at], views[at]) for at in truths]))
@@ -252,7 +266,8 @@ def main() -> None:
                 print(
                     f"{text} seed {seed}: angles {measured.angle_deg:.3f} deg, rows {measured.rows.text()},"
                     f" columns {measured.columns.text()}, views {measured.views_db:.2f} dB"
-                    f" (ideal {best:.2f}), {measured.cpu_s:.1f} s of CPU",
+                    f" (ideal {best:.2f}, ideal in place {measured.in_place_db:.2f}),"
+                    f" {measured.cpu_s:.1f} s of CPU",
                     flush=True,
                 )
     if arguments.json:
