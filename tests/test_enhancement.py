@@ -23,7 +23,7 @@ from mvcodec.conformance.validation import validate
 from mvcodec.container import McapReader, McapWriter
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
-from mvcodec.encoding.enhancer import enhanced_views, layer_order
+from mvcodec.encoding.enhancer import FINER_FOR_OTHERS, enhanced_views, layer_order, view_quantizers
 from mvcodec.enhancement import LAYER_TRACK, EnhancedView, EnhancementHeader
 from mvcodec.errors import InputError, MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import DecodedSet, FrameSet
@@ -193,6 +193,23 @@ def test_what_a_view_builds_on_can_be_kept_few(most: int | None) -> None:
     others = [len(header.needed([view])) - 1 for view in virtual]
     assert len(header.views) == len(virtual)
     assert max(others) == (8 if most is None else most)
+
+
+def test_views_that_others_build_on_are_coded_finer() -> None:
+    header = EnhancementHeader(layer_order(ARRAY, VIRTUAL))
+    found = view_quantizers(header, 30)
+    assert found[1, 1] == min(found.values())  # all others build on it
+    assert found[2, 1] == max(found.values())  # none does
+    assert found[2, 1] - found[1, 1] == FINER_FOR_OTHERS
+    assert abs(sum(found.values()) / len(found) - 30) <= 0.5
+    assert set(view_quantizers(header, 1).values()) >= {1}
+    assert max(view_quantizers(header, 63).values()) == 63
+
+
+def test_a_layer_of_one_view_or_of_views_apart_has_one_quantizer() -> None:
+    assert view_quantizers(EnhancementHeader(layer_order(ARRAY, [(1, 1)])), 30) == {(1, 1): 30}
+    apart = EnhancementHeader(layer_order(ARRAY, VIRTUAL, most=0))
+    assert view_quantizers(apart, 30) == dict.fromkeys(VIRTUAL, 30)
 
 
 def test_another_base_is_told_by_the_checksum(coded: list[list[Packet]]) -> None:

@@ -7,7 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from mvcodec.array import Position
 from mvcodec.encoding.config import EncoderConfig
 from mvcodec.encoding.enhancer import Enhancer
-from mvcodec.encoding.predicted_cameras import PredictedCameras, predicted_quantizer
+from mvcodec.encoding.predicted_cameras import (
+    CAMERA_LINE,
+    LAYER_LINE,
+    PredictedCameras,
+    predicted_quantizer,
+)
 from mvcodec.frames import DisparityMap, FrameSet, Picture
 from mvcodec.stream import HEADER_TRACK, Packet, StreamHeader, Track, TrackKind
 from mvcodec.video.codec import CodedPicture, Planes, RateControl, VideoEncoder, VideoSettings
@@ -55,14 +60,14 @@ class Coders:
         self._predicted: PredictedCameras | None = None
         if header.predicted:
             assert config.quality is not None
-            quantizer = predicted_quantizer(config.quality, self._codec)
+            quantizer = predicted_quantizer(config.quality, self._codec, CAMERA_LINE)
             self._predicted = PredictedCameras(header, self._codec, quantizer, config.chosen_preset)
         self._enhancer: Enhancer | None = None
         if layer_views:
             quality = config.layer_quality(len(layer_views), len(array.real))
             assert quality is not None
             assert config.enhance is not None
-            quantizer = predicted_quantizer(quality, self._codec)
+            quantizer = predicted_quantizer(quality, self._codec, LAYER_LINE)
             self._enhancer = Enhancer(
                 header, layer_views, quantizer, config.chosen_preset, config.enhance, config.enhance_chain
             )

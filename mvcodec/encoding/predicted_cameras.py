@@ -20,9 +20,13 @@ from mvcodec.workers import run_all
 SPEEDS = dict(zip(PRESETS, (8, 7, 6, 5, 4, 3, 1, 1, 0, 0), strict=True))
 """libvpx's cpu-used for the efforts that x264 has names for."""
 
-QUANTIZER_LINE = (2.0, -25.0)
-"""(slope, offset): ``slope * qp + offset`` is the quantizer of predicted pictures beside libx264's QP for the
-others. Of -31, -25 for the offset the latter saves more on shop_v3 (22.0 and 27.5 %, docs/prediction.md)."""
+CAMERA_LINE = (1.8, -18.0)
+"""(slope, offset): ``slope * qp + offset`` is the quantizer of predicted cameras beside libx264's QP for the
+others. Where pictures are fine it is coarser than `LAYER_LINE`: bits are better spent in the first camera,
+which all others are predicted from (docs/measurements.md)."""
+
+LAYER_LINE = (2.0, -25.0)
+"""The same for views of an enhancement layer and its QP."""
 
 
 def prediction_order(array: CameraArray) -> tuple[PredictedCamera, ...]:
@@ -40,11 +44,15 @@ def prediction_order(array: CameraArray) -> tuple[PredictedCamera, ...]:
     return tuple(found)
 
 
-def predicted_quantizer(quality: float, codec: Codec) -> int:
-    """The quantizer, 0..63, of predicted pictures beside others of a QP or CRF on the codec's own scale."""
+def predicted_quantizer(quality: float, codec: Codec, line: tuple[float, float]) -> int:
+    """The quantizer, 1..63, of predicted pictures for a QP or CRF on the codec's own scale.
+
+    Args:
+        line: CAMERA_LINE or LAYER_LINE.
+    """
     slope, offset = codec.qp_line
     of_x264 = (quality - offset) / slope
-    return min(max(round(QUANTIZER_LINE[0] * of_x264 + QUANTIZER_LINE[1]), 1), MAX_QUANTIZER)
+    return min(max(round(line[0] * of_x264 + line[1]), 1), MAX_QUANTIZER)
 
 
 class PredictedCameras:
