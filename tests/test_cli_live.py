@@ -70,6 +70,17 @@ def test_a_range_of_a_recording_and_what_is_missing_from_the_command(recorded: P
     assert "4 topics, expected 3x2" in fails(2, "encode", recorded, out, "-y", *with_grid[:3], "3x2")
 
 
+def test_the_first_frame_set_of_a_recording_widens_a_range_that_is_too_narrow(
+    recorded: Path, tmp_path: Path
+) -> None:
+    out, narrow = tmp_path / "out.mcap", ("--frames", ":2", *FAST, "--disparity-range", "0,2")
+    assert "beyond the stated 0..2 px; widened to 0..7 px" in mvcodec("encode", recorded, out, *narrow).stderr
+    assert _indexes(out.read_bytes()) == [0, 1]
+    assert read_info(out).header.disparity_range_px == (0, 7)
+    assert mvcodec("encode", recorded, out, "-y", *narrow, "--exact-range").stderr.count("\n") == 1
+    assert read_info(out).header.disparity_range_px == (0, 2)
+
+
 def test_bytes_go_through_pipes_from_producer_to_viewer(recorded: Path) -> None:
     encoder = subprocess.Popen(
         [*COMMAND, "encode", "-", "-", *FAST, "--qp", "14"],

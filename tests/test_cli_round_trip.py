@@ -226,6 +226,23 @@ def test_every_setting_at_once(array: Path, tmp_path: Path) -> None:
     assert json.loads(rated)["frames"] == FRAMES
 
 
+def test_a_range_that_the_pictures_exceed_is_widened_and_told_unless_it_is_exact(
+    array: Path, tmp_path: Path
+) -> None:
+    options = array, tmp_path / "x.mcap", "--frames", ":1", "--disparity-range", "0,2", "--dry-run"
+    done = mvcodec("encode", *options)
+    assert "beyond the stated 0..2 px; widened to 0..8 px (--exact-range keeps it as stated)" in done.stderr
+    assert json.loads(done.stdout)["disparity_range_px"] == [0, 8]
+    exact = mvcodec("encode", *options, "--exact-range")
+    assert "the pictures show" not in exact.stderr
+    assert json.loads(exact.stdout)["disparity_range_px"] == [0, 2]
+    told = fails(2, "encode", array, tmp_path / "x.mcap", "--disparity-range", "auto", "--exact-range")
+    assert (
+        told
+        == "mvcodec: error: --exact-range: found no range, expected --disparity-range LO,HI, which it keeps"
+    )
+
+
 def test_a_pair_of_cameras_that_are_both_real(tmp_path: Path) -> None:
     write_array(tmp_path / "pair", 1, 2, 2)
     succeeds("encode", tmp_path / "pair", tmp_path / "x.mcap", "--real", "all", "--quiet")

@@ -14,7 +14,7 @@ from stereo_scene import Planes, linear_or_grid
 from mvcodec.array import Calibration, CameraArray, Position
 from mvcodec.errors import MvCodecWarning, SettingError
 from mvcodec.frames import FrameSet, Picture
-from mvcodec.stereo.disparity_range import FALLBACK_RANGE_PX, estimate_range
+from mvcodec.stereo.disparity_range import FALLBACK_RANGE_PX, estimate_range, make_room
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 
@@ -127,6 +127,28 @@ def test_a_hint_that_is_too_narrow_is_widened_and_that_is_told(
         found = estimate_range(array, frames, hint)
     assert low - 4 <= found[0] <= low
     assert high <= found[1] <= high + 6
+
+
+@pytest.mark.parametrize(
+    ("stated", "low", "high"),
+    [((20.0, 22.0), 10, 30), ((-40.0, -20.0), -40, 30), ((12.0, 60.0), 10, 60)],
+    ids=str,
+)
+def test_a_stated_range_makes_room_for_what_the_pictures_show_and_is_never_narrower(
+    stated: tuple[float, float], low: int, high: int
+) -> None:
+    array = linear_or_grid(1, 2, 320, 200, name="mine")
+    frames = [Planes(array, 10, 30).frame_set()]
+    with pytest.warns(MvCodecWarning, match=r"mine: the pictures show .*; widened to .*\(think again\)"):
+        found = make_room(array, frames, stated, "think again")
+    assert low - 4 <= found[0] <= min(low, stated[0])
+    assert max(high, stated[1]) <= found[1] <= high + 6
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert make_room(array, frames, (-50.0, 100.0), "") == (-50.0, 100.0)
+        assert make_room(array, frames, (9.5, 30.0), "") == (9.5, 30.0)
+        flat = [FrameSet(0, 0, {position: np.full((200, 320, 3), 9, np.uint8) for position in array.real})]
+        assert make_room(array, flat, stated, "") == stated
 
 
 @pytest.mark.parametrize("level", [0, 5, 255])

@@ -9,6 +9,7 @@ from plane_scene import Plane, PlaneScene, grid
 
 from mvcodec.array import Position
 from mvcodec.cli.coding_options import find_range
+from mvcodec.errors import MvCodecWarning
 from mvcodec.frames import DisparityMap, FrameSet
 
 
@@ -42,3 +43,14 @@ def test_a_short_time_tells_no_more_than_one_frame_set(seconds: float, expected:
     low, high = find_range(source, range(count), "auto")
     assert low < 6 < high
     assert source.read == [count - 1 if place == -1 else int(place * (count - 1)) for place in expected]
+
+
+def test_what_has_been_read_is_not_read_again_and_an_exact_range_reads_nothing() -> None:
+    source = Counted(3)
+    (first,) = source.frame_sets(slice(0, 1))
+    low, high = find_range(source, range(3), "auto", first=first)
+    assert low < 6 < high
+    with pytest.warns(MvCodecWarning, match=r"beyond the stated 0\.\.4 px; .*--exact-range keeps it"):
+        assert find_range(source, range(3), (0.0, 4.0), first=first)[1] > 6
+    assert find_range(source, range(3), (0.0, 4.0), exact=True) == (0.0, 4.0)
+    assert source.read == [0]

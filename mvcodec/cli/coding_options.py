@@ -20,13 +20,16 @@ from mvcodec.cli.paths import local_path
 from mvcodec.cli.setting_options import add_setting
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.speed_choice import FOR_FILES, FOR_LIVE
+from mvcodec.errors import SettingError
 from mvcodec.frames import FrameSet
 from mvcodec.layers.refinement import matcher_choices
-from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
+from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range, make_room
 from mvcodec.stereo.given import given_range
 
 APART_S = 0.5
 """Pictures nearer to each other in time tell the same of the range of disparities."""
+
+INSIST = "--exact-range keeps it as stated"
 
 CODING = (
     "codec",
@@ -70,7 +73,10 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
         "disparity_range_px",
         parse=disparity_range,
         metavar="LO,HI|auto",
-        note="; auto: estimated whatever the input states",
+        note="; auto: estimated whatever the input states. Widened where the pictures show more",
+    )
+    parser.add_argument(
+        "--exact-range", action="store_true", help="take --disparity-range as it stands, whatever they show"
     )
     add_setting(parser, EncoderConfig, "gop")
     add_setting(
@@ -81,6 +87,12 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
         note=f", {matcher_choices()}; mvcodec plugins lists settings",
     )
     add_setting(parser, EncoderConfig, "preset")
+
+
+def check_exact_range(arguments: argparse.Namespace) -> None:
+    """Refuse ``--exact-range`` where no range is given."""
+    if arguments.exact_range and not isinstance(arguments.disparity_range_px, tuple):
+        raise SettingError("--exact-range", "no range", "--disparity-range LO,HI, which it keeps")
 
 
 def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: Any) -> EncoderConfig:
@@ -103,18 +115,24 @@ def find_range(
     source: ArraySource,
     chosen: range,
     option: tuple[float, float] | str | None,
+    *,
     given: bool = False,
+    exact: bool = False,
     first: FrameSet | None = None,
 ) -> tuple[float, float]:
     """The range of disparities, px, that ``--disparity-range`` asks for, estimated where it gives none.
 
     Args:
         given: the maps that the input has will be coded: their own range counts.
+        exact: the option's range is not widened where the pictures show more.
         first: the first frame set of those chosen, where it has been read already.
     """
-    if isinstance(option, tuple):
-        return option
+    stated = option if isinstance(option, tuple) else None
+    if stated and (exact or given):
+        return stated
     samples = _samples(source, chosen, first)
+    if stated:
+        return make_room(source.array, samples, stated, INSIST)
     if given:
         return given_range(samples)
     hint = None if option == "auto" else source.array.disparity_hint_px

@@ -16,7 +16,7 @@ from mvcodec.capture.manifest import read_calibration
 from mvcodec.capture.recording_files import recording_files
 from mvcodec.capture.selection import CORNERS
 from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, add_output_options
-from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
+from mvcodec.cli.coding_options import add_coding, add_input, check_exact_range, checked_config, find_range
 from mvcodec.cli.encode_stream import (
     GIVEN,
     Unfinished,
@@ -139,6 +139,7 @@ def _check_effect(arguments: argparse.Namespace) -> None:
     """Refuse options that would have no effect."""
     if arguments.json and str(arguments.output) == STANDARD:
         raise SettingError("--json", "with OUT -", "another OUT: both would be standard output")
+    check_exact_range(arguments)
     if arguments.nominal and not arguments.depth:
         raise SettingError("--nominal", "no --depth", "--depth raw16, for which it accepts the calibration")
     if not is_stream(arguments):
@@ -175,7 +176,14 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
         range_px = source.disparity_range_px
     else:
         with stage("find the range of disparities", quiet=arguments.quiet):
-            range_px = find_range(source, chosen, arguments.disparity_range_px, given, first)
+            range_px = find_range(
+                source,
+                chosen,
+                arguments.disparity_range_px,
+                given=given,
+                exact=arguments.exact_range,
+                first=first,
+            )
     del first  # its memory is as large as what is coded next
     if arguments.dry_run:
         print(plan(array, config, chosen, range_px))

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import BinaryIO
 
@@ -18,6 +18,7 @@ from mvcodec.capture.recording import Recording
 from mvcodec.capture.recording_settings import RecordingSettings, TopicGrid
 from mvcodec.capture.sync_topics import with_offsets
 from mvcodec.cli.arguments import OPTIONS, in_options
+from mvcodec.cli.coding_options import INSIST
 from mvcodec.cli.interrupt import deferred_interrupt
 from mvcodec.cli.live_options import add_patience, is_live, live_cameras
 from mvcodec.cli.live_view_option import live_view
@@ -38,6 +39,7 @@ from mvcodec.errors import InputError, MvCodecError, MvCodecWarning, SettingErro
 from mvcodec.frames import FrameSet
 from mvcodec.output.live_view import LiveView
 from mvcodec.settings import settings_of
+from mvcodec.stereo.disparity_range import make_room
 
 SUFFIX = ".mcap"
 GIVEN = "given"
@@ -121,13 +123,18 @@ def encode_stream(
     with live_view(arguments) as view, _opened(arguments) as source:
         straight = rectified_stream(source, arguments)
         config = make_config(straight.array)
+        frame_sets: Iterator[FrameSet] = islice(straight.frame_sets(), first, stop)
         span = arguments.disparity_range_px
         if isinstance(span, tuple):
+            if not arguments.exact_range and str(config.chosen_matcher).split(":")[0] != GIVEN:
+                seen = list(islice(frame_sets, 1))
+                span = make_room(straight.array, seen, span, INSIST) if seen else span
+                frame_sets = chain(seen, frame_sets)
             config = replace(config, disparity_range_px=span)
         if source.calibration_note and not straight.array.calibration.given:
             text = f"{source.name}: {source.calibration_note}; nominal values stand in"
             warnings.warn(text, MvCodecWarning, stacklevel=2)
-        return _run(arguments, straight, config, islice(straight.frame_sets(), first, stop), view)
+        return _run(arguments, straight, config, frame_sets, view)
 
 
 def _run(

@@ -14,7 +14,7 @@ from mvcodec.array import CameraArray
 from mvcodec.capture import open_input, resolve_frames
 from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, codec_name, positive_int
 from mvcodec.cli.cluster_options import add_cluster, place
-from mvcodec.cli.coding_options import add_coding, add_input, checked_config, find_range
+from mvcodec.cli.coding_options import add_coding, add_input, check_exact_range, checked_config, find_range
 from mvcodec.cli.layer_options import add_layer, layer_settings
 from mvcodec.cli.paths import check_folder_target
 from mvcodec.cli.progress import progress
@@ -99,7 +99,9 @@ def _evaluate(arguments: argparse.Namespace, stack: ExitStack) -> None:
     output: Path = arguments.output
     source = open_input(_inputs(arguments, stack), grid=arguments.grid, real=arguments.real)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
-    study = _study(source.array, arguments, find_range(source, chosen, arguments.disparity_range_px))
+    check_exact_range(arguments)
+    range_px = find_range(source, chosen, arguments.disparity_range_px, exact=arguments.exact_range)
+    study = _study(source.array, arguments, range_px)
     facts = examine(source, chosen)
     store = PointStore(output / POINTS)
     with progress("evaluate", None, quiet=arguments.quiet, unit="picture") as bar:

@@ -19,8 +19,8 @@ def add_segment(parser: argparse.ArgumentParser) -> None:
         default=0,
         metavar="N",
         help="N frame sets come before these in files of their own, for `mvcodec join`; N is a multiple of"
-        " the GOP. Give all segments the same --disparity-range. With --qp and codec h264 or av1 the"
-        " joined file then has the packets that one run would have written",
+        " the GOP. Give all segments the same --disparity-range and --exact-range. With --qp and codec h264"
+        " or av1 the joined file then has the packets that one run would have written",
     )
     parser.add_argument(
         "--dry-run",

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray
 from mvcodec.errors import MvCodecWarning, SettingError
-from mvcodec.frames import FloatMap, FrameSet, Mask, Picture
-from mvcodec.stereo.ambiguity import unambiguous
-from mvcodec.stereo.consistency import drop_speckles, left_right_check
+from mvcodec.frames import FrameSet, Picture
 from mvcodec.stereo.pairwise import CameraPair, camera_pairs, transposed
-from mvcodec.stereo.sgbm import Sgbm, SgbmSettings
+from mvcodec.stereo.sure_matches import filled_runs, sure_matches, textured_share
 from mvcodec.workers import run_all
 
 FALLBACK_RANGE_PX = (0.0, 16.0)
@@ -31,26 +29,19 @@ WIDEST_SHARE = 0.45
 COARSE_WIDTH, FINE_WIDTH = 240, 480
 MIN_MATCHED_SHARE = 0.005
 
-_CAREFUL = SgbmSettings(block_size=3, p1=8, p2=32, uniqueness_percent=10)
 _BORDER_SHARE = 1 / 64
-_WINDOW = 5
-_MIN_CONTRAST = 2.5
-_MIN_CORRELATION = 0.7
 _TEXTURED_SHARE = 0.1
 """Of a picture that has contrast: less is too little to match by."""
 _DARK_LEVEL = 12.0
-_MIN_PATCH_PX = 20
-_MAX_GAP_BINS = 2
 # A small near object matters more than a small far one: it hides what is behind it. So less
 # support is asked of it, of the pixels of a pair: of values apart from all others, and of the
 # last of those in the main run.
 _NEAR_CLUSTER, _FAR_CLUSTER = 0.0007, 0.003
-_REPEATED_CLUSTER = 0.3
 _NEAR_TAIL, _FAR_TAIL = 0.0005, 0.001
 _NEAR_MARGIN, _FAR_MARGIN = 0.1, 0.02
 _LEAST_MARGIN_PX = 1.0
-_BESIDE_HINT = 0.5
-"""Of a hint's extent, how far beyond it is looked: further, chance would find more than scenes hold."""
+_BESIDE_HINT, _LEAST_BESIDE_PX = 0.5, 4.0
+"""Of a hint's extent, and px, how far beyond it is looked: further, chance would find more than there is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,15 +92,8 @@ def estimate_range(
     jobs = _jobs(array, frame_sets)
     if not jobs:
         return hint_px or FALLBACK_RANGE_PX
-    # A hint that is too narrow is to be seen as such.
-    around = hint_px and (
-        hint_px[0] - _BESIDE_HINT * (hint_px[1] - hint_px[0]),
-        hint_px[1] + _BESIDE_HINT * (hint_px[1] - hint_px[0]),
-    )
-    found = _search(jobs, COARSE_WIDTH, around)
-    coarse = _union(found)
-    share = float(np.mean([item.share for item in found]))
-    if coarse is None or share < MIN_MATCHED_SHARE:
+    coarse, seen, share = _seen(array, jobs, hint_px)
+    if seen is None:
         fallback = hint_px or coarse or FALLBACK_RANGE_PX
         warnings.warn(
             f"{array.name or 'input'}: {_reason(jobs)} ({share:.1%} of the pixels found"
@@ -118,25 +102,63 @@ def estimate_range(
             stacklevel=2,
         )
         return fallback
-    # The fine pass sees small near objects that the coarse one lost, hence the wider span on that side.
-    extent = coarse[1] - coarse[0]
-    slack = max(4.0, array.width / 64)
-    span = coarse[0] - 0.1 * extent - slack, coarse[1] + 0.3 * extent + slack
-    fine = _union(_search(jobs, FINE_WIDTH, _inside(span, around)))
-    low, high = fine or coarse
+    low, high = seen
     if hint_px is not None:
-        hint_px = _widened(hint_px, (low, high), array.name)
+        hint_px = _widened(hint_px, seen, array.name, "state disparity_per_step_px anew, or leave it out")
     extent = high - low
     low -= _LEAST_MARGIN_PX + _FAR_MARGIN * extent
     high += _LEAST_MARGIN_PX + _NEAR_MARGIN * extent
     return _inside((float(math.floor(low)), float(math.ceil(high))), hint_px)
 
 
+def make_room(
+    array: CameraArray, frame_sets: Sequence[FrameSet], stated_px: tuple[float, float], advice: str
+) -> tuple[float, float]:
+    """A range that somebody stated, or a wider one where the pictures show more: a MvCodecWarning says so.
+
+    Args:
+        array, frame_sets: as in `estimate_range`.
+        stated_px: (lo, hi) between neighbouring real cameras, px, lo < hi. The result is never narrower.
+        advice: what the warning says that can be done.
+    """
+    jobs = _jobs(array, frame_sets)
+    seen = _seen(array, jobs, stated_px)[1] if jobs else None
+    return stated_px if seen is None else _widened(stated_px, seen, array.name, advice)
+
+
+def _seen(
+    array: CameraArray, jobs: Sequence[_Job], hint_px: tuple[float, float] | None
+) -> tuple[tuple[float, float] | None, tuple[float, float] | None, float]:
+    """(lo, hi), px, that small copies show; that larger ones do, if enough matches; the share that does."""
+    around = hint_px and _around(hint_px)
+    found = _search(jobs, COARSE_WIDTH, around)
+    if around and _share(found) < MIN_MATCHED_SHARE:
+        around, found = None, _search(jobs, COARSE_WIDTH, None)
+    coarse, share = _union(found), _share(found)
+    if coarse is None or share < MIN_MATCHED_SHARE:
+        return coarse, None, share
+    # The fine pass sees small near objects that the coarse one lost, hence the wider span on that side.
+    extent = coarse[1] - coarse[0]
+    slack = max(4.0, array.width / 64)
+    span = coarse[0] - 0.1 * extent - slack, coarse[1] + 0.3 * extent + slack
+    return coarse, _union(_search(jobs, FINE_WIDTH, _inside(span, around))) or coarse, share
+
+
+def _around(hint_px: tuple[float, float]) -> tuple[float, float]:
+    """What is searched, px: a hint that is too narrow is to be seen as such."""
+    beside = max(_BESIDE_HINT * (hint_px[1] - hint_px[0]), _LEAST_BESIDE_PX)
+    return hint_px[0] - beside, hint_px[1] + beside
+
+
+def _share(found: Sequence[_Found]) -> float:
+    return float(np.mean([item.share for item in found]))
+
+
 def _reason(jobs: Sequence[_Job]) -> str:
     """Why pictures don't match: what contrast they have, and how bright they are."""
     pictures = [_shrunk(picture, COARSE_WIDTH) for job in jobs for picture in (job.left, job.right)]
     levels = [cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY).astype(np.float32) for picture in pictures]
-    textured = [float(np.mean(_variance(grey) > _MIN_CONTRAST**2)) for grey in levels]
+    textured = [textured_share(grey) for grey in levels]
     if min(textured) >= _TEXTURED_SHARE:
         return (
             "the cameras' pictures don't match; are they of one moment, in the order of the grid, and"
@@ -154,7 +176,9 @@ def _inside(range_px: tuple[float, float], hint_px: tuple[float, float] | None) 
     return (low, high) if low < high else hint_px
 
 
-def _widened(hint_px: tuple[float, float], seen_px: tuple[float, float], name: str) -> tuple[float, float]:
+def _widened(
+    hint_px: tuple[float, float], seen_px: tuple[float, float], name: str, advice: str
+) -> tuple[float, float]:
     """The hint, or further where the pictures show more than that; which is told."""
     low, high = seen_px
     beyond = low < hint_px[0] - _LEAST_MARGIN_PX, high > hint_px[1] + _LEAST_MARGIN_PX
@@ -168,7 +192,7 @@ def _widened(hint_px: tuple[float, float], seen_px: tuple[float, float], name: s
     warnings.warn(
         f"{name or 'input'}: the pictures show disparities of {low:.0f}..{high:.0f} px, beyond the stated"
         f" {hint_px[0]:g}..{hint_px[1]:g} px; widened to {wider[0]:g}..{wider[1]:g} px"
-        " (state disparity_per_step_px anew, or leave it out)",
+        f" ({advice})",
         MvCodecWarning,
         stacklevel=3,
     )
@@ -228,7 +252,7 @@ def _search_pair(job: _Job, width: int, span_px: tuple[float, float] | None) -> 
         span = max(span_px[0] / unit, -left.shape[1]), min(span_px[1] / unit, left.shape[1])
     if not span[0] < span[1]:
         return _Found(None, 0.0)
-    values, sure = _sure_matches(left, right, span)
+    values, sure = sure_matches(left, right, span)
     tails = _tails(values[sure], sure.size)
     return _Found((tails[0] * unit, tails[1] * unit) if tails else None, float(sure.mean()))
 
@@ -241,72 +265,13 @@ def _shrunk(picture: Picture, width: int) -> Picture:
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _sure_matches(left: Picture, right: Picture, span_px: tuple[float, float]) -> tuple[FloatMap, Mask]:
-    """Left disparities, and where they are beyond doubt."""
-    raw_left, raw_right = Sgbm(_CAREFUL).raw_pair(left, right, span_px)
-    sure = left_right_check(*raw_left, *raw_right, partner_is_right=True)
-    values = raw_left[0]
-    height, width = values.shape
-    levels, levels_right = (np.asarray(cv2.cvtColor(p, cv2.COLOR_RGB2GRAY), np.uint8) for p in (left, right))
-    grey, grey_right = levels.astype(np.float32), levels_right.astype(np.float32)
-    columns = np.arange(width, dtype=np.float32)[None] - values
-    rows = np.repeat(np.arange(height, dtype=np.float32)[:, None], width, axis=1)
-    partner = cv2.remap(grey_right, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    # Noise has contrast of its own, but no likeness in the other picture: both are asked for.
-    sure &= _alike(grey, np.asarray(partner, np.float32))
-    sure = drop_speckles(values, sure, _MIN_PATCH_PX)
-    return values, _not_repeated(values, sure, unambiguous(levels, levels_right, values, span_px))
-
-
-def _not_repeated(values: FloatMap, sure: Mask, unique: Mask) -> Mask:
-    """Sure matches less ambiguous ones, but of these the many that say the same stay.
-
-    On repeated texture the surroundings bring most of a wall to its place, and some of it a period
-    beside. Without any of it the wall would be lost.
-    """
-    doubtful = sure & ~unique
-    if not doubtful.any():
-        return sure
-    kept = drop_speckles(values, sure & unique, _MIN_PATCH_PX)
-    bins = np.floor(values).astype(np.int64)
-    first = bins[doubtful].min()
-    counts = np.bincount(bins[doubtful] - first)
-    runs = _runs(counts)
-    most = max(counts[start:end].sum() for start, end in runs)
-    for start, end in runs:
-        if counts[start:end].sum() >= _REPEATED_CLUSTER * most:
-            kept |= doubtful & (bins >= start + first) & (bins < end + first)
-    return kept
-
-
-def _mean(pixels: FloatMap) -> FloatMap:
-    """Of each pixel's window."""
-    return np.asarray(cv2.blur(pixels, (_WINDOW, _WINDOW)), np.float32)
-
-
-def _variance(pixels: FloatMap) -> FloatMap:
-    """Of each pixel's window."""
-    mean = _mean(pixels)
-    return np.asarray(_mean(pixels * pixels) - mean * mean, np.float32)
-
-
-def _alike(first: FloatMap, second: FloatMap) -> Mask:
-    """Where windows of two pictures have contrast and correlate (NCC, equation 3.6)."""
-
-    variance_a, variance_b = _variance(first), _variance(second)
-    covariance = _mean(first * second) - _mean(first) * _mean(second)
-    contrast = np.minimum(variance_a, variance_b) > _MIN_CONTRAST**2
-    correlated = covariance > _MIN_CORRELATION * np.sqrt(np.maximum(variance_a * variance_b, 0))
-    return np.asarray(contrast & correlated)
-
-
 def _tails(values: NDArray[np.float32], pixels: int) -> tuple[float, float] | None:
     """(lo, hi) of the values, less what too few pixels share at either end."""
     if values.size == 0:
         return None
     first = math.floor(values.min())
     bins = np.bincount(np.floor(values).astype(np.int64) - first)
-    runs = _runs(bins)
+    runs = filled_runs(bins)
     while runs and bins[runs[0][0] : runs[0][1]].sum() < _FAR_CLUSTER * pixels:
         runs.pop(0)
     while runs and bins[runs[-1][0] : runs[-1][1]].sum() < _NEAR_CLUSTER * pixels:
@@ -318,12 +283,3 @@ def _tails(values: NDArray[np.float32], pixels: int) -> tuple[float, float] | No
     low = kept[min(int(_FAR_TAIL * pixels), last)]
     high = kept[max(last - int(_NEAR_TAIL * pixels), 0)]
     return float(min(low, high)), float(high)
-
-
-def _runs(bins: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """[start, end) of runs of filled bins, small gaps tolerated."""
-    filled = np.flatnonzero(bins > 0)
-    breaks = np.flatnonzero(np.diff(filled) > _MAX_GAP_BINS + 1)
-    starts = filled[np.concatenate([[0], breaks + 1])]
-    ends = filled[np.concatenate([breaks, [filled.size - 1]])] + 1
-    return list(zip(starts.tolist(), ends.tolist(), strict=True))
