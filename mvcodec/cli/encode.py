@@ -164,10 +164,12 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
     config = _config(array, arguments)
     check_continues(array, config, arguments.continues)
     if not array.calibration.given:
-        text = (
-            f"{source.name}: no calibration given; nominal values stand in (f = picture width, 0.1 m a step)"
+        stand_in = (
+            "no calibration given; nominal values stand in (f = picture width, 0.1 m a step)"
+            if arguments.rig is None
+            else "the rig does not say how far its cameras stand apart; 0.1 m a step stands in"
         )
-        warnings.warn(text, MvCodecWarning, stacklevel=2)
+        warnings.warn(f"{source.name}: {stand_in}", MvCodecWarning, stacklevel=2)
     given = str(config.chosen_matcher).split(":")[0] == GIVEN
     if source.has_given and not given:
         text = f"{source.name}: it has disparity or depth of its own, which --matcher {GIVEN} codes"

@@ -51,7 +51,7 @@ class Calibrated:
     Attributes:
         rig: with colours.
         frame_sets: that were looked at.
-        every: the points that were found in them.
+        every: the points that were found in them; by the scene alone, those that could be laid on each other.
         tracks: of these, those that agree with the rig.
         pairs: how well the pictures were matched.
         before, after: residuals of `tracks` in the cameras' pictures and in the rectified ones.
@@ -99,9 +99,10 @@ def calibrate_from_scene(
     size = array.width, array.height
     known = focal_px is not None
     expected = array.calibration.fx_px if focal_px is None else focal_px
-    adjusted = adjust(finer(every, frame_sets), grid, size, expected, focal_known=known)
+    fine = finer(every, frame_sets)
+    adjusted = adjust(fine, grid, size, expected, focal_known=known)
     rig = rig_from_adjusted(array, adjusted, wishes.crop, wishes.size)
-    return _finished(rig, frame_sets, every, adjusted.tracks, pairs)
+    return _finished(rig, frame_sets, fine, adjusted.tracks, pairs)
 
 
 def calibrate_from_files(
