@@ -8,7 +8,7 @@ import view_twins as twins
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from view_kernel_input import SHAPES, Shape, in_bands, in_steps, seeds, shapes, smoother, some_maps
+from view_kernel_input import SHAPES, Shape, in_bands, in_pairs, in_steps, seeds, shapes, smoother, some_maps
 
 from mvcodec.frames import FloatMap, Mask
 from mvcodec.kernels import (
@@ -117,9 +117,11 @@ def test_split_luma(shape: Shape) -> None:
     border = view_fetch.BORDER
     picture = np.random.default_rng(3).integers(0, 256, (*shape, 3), dtype=np.uint8)
     size = shape[0] + 2 * border, shape[1] + 2 * border
-    luma, colour = np.full(size, -9, np.int16), np.full((*size, 2), -9, np.int16)
-    view_planes.split_luma(picture, luma, colour)
-    for found, expected in zip((luma, colour), twins.split_luma(picture, border), strict=True):
+    pairs, colour = np.full((2, *size, 2), -9, np.int16)
+    view_planes.split_luma(picture, pairs, colour)
+    luma, differences = twins.split_luma(picture, border)
+    below = np.concatenate([luma[1:], luma[-1:]])
+    for found, expected in ((pairs, np.stack([luma, below], axis=-1)), (colour, differences)):
         np.testing.assert_allclose(found / view_vectors.LEVELS, expected, atol=0.51 / view_vectors.LEVELS)
 
 
@@ -129,7 +131,7 @@ def test_weights_of_a_fetch_sum_up_to_one(sharpness: float) -> None:
     assert (weights[:, :16].sum(axis=1) == view_vectors.ONE).all()
     assert (weights[:, 16:].sum(axis=1) == 2 * view_vectors.ONE).all()
     # The first place is the pixel itself: second row, second column.
-    assert weights[0, 5] == view_vectors.ONE
+    assert weights[0, 3] == view_vectors.ONE
 
 
 def test_the_twins_know_how_fine_a_fetch_is() -> None:
@@ -156,12 +158,12 @@ def test_mark_contours(seed: int, shape: Shape, tolerance: float) -> None:
 def planes_of(sources: list[twins.Source], tolerance: float) -> Planes:
     """The arrays that `blend` takes."""
     split = [twins.split_luma(source.picture, view_fetch.BORDER) for source in sources]
-    return (
-        in_steps(np.array([luma for luma, _ in split])),
-        in_steps(np.array([colour for _, colour in split])),
-        np.array([source.disparity for source in sources], np.float32),
-        np.array([fetchable(source.disparity, tolerance) for source in sources], np.float32),
-    )
+    planes = view_planes.make_room(len(sources), *sources[0].disparity.shape)
+    planes[0][:] = in_pairs(np.array([luma for luma, _ in split]))
+    planes[1][:] = in_steps(np.array([colour for _, colour in split]))
+    planes[2][:] = [source.disparity for source in sources]
+    planes[3][:] = [fetchable(source.disparity, tolerance) for source in sources]
+    return planes
 
 
 def check_blend(rng: np.random.Generator, shape: Shape, count: int, chosen: LayeredSettings) -> Mask:
@@ -189,6 +191,7 @@ def check_blend(rng: np.random.Generator, shape: Shape, count: int, chosen: Laye
         view,
         tolerance,
         chosen.edge_trust,
+        chosen.sharpness,
         view_vectors.fetch_weights(chosen.sharpness),
         pixels,
         seen_by,

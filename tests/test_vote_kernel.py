@@ -8,7 +8,7 @@ import view_twins as twins
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from view_kernel_input import Shape, in_bands, in_steps, seeds, shapes, some_maps
+from view_kernel_input import Shape, in_bands, in_pairs, seeds, shapes, some_maps
 
 from mvcodec.frames import FloatMap
 from mvcodec.kernels import (
@@ -21,7 +21,7 @@ LIMITS = twins.Limits(tolerance=1.5, contrast=10, ratio=1.3, denial=0.6)
 def voted(maps: NDArray[np.float32], ballot: twins.Ballot, limits: twins.Limits) -> FloatMap:
     out = np.full((maps.shape[1] - 2, maps.shape[2] - 2), np.nan, np.float32)
     cameras = np.arange(len(maps))
-    who = cameras, ballot.maps, in_steps(ballot.lumas), ballot.shifts, ballot.weights
+    who = cameras, ballot.maps, in_pairs(ballot.lumas), ballot.shifts, ballot.weights
     in_bands(out.shape[0], out, lambda *band: view_depth.vote(maps, *who, *limits, out, *band))
     return out
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mvcodec.kernels import view_vectors
 
-SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11), (14, 8)]
+SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11), (14, 8), (3, 37), (2, 32)]
 seeds = st.integers(0, 2**32 - 1)
 shapes = st.tuples(st.integers(1, 12), st.integers(1, 12))
 Shape = tuple[int, int]
@@ -48,3 +48,9 @@ def in_bands(height: int, out: NDArray[np.float32] | NDArray[np.uint8], run: Run
 def in_steps(levels: NDArray[np.floating]) -> NDArray[np.int16]:
     """Grey levels as the kernels take them."""
     return np.asarray(np.rint(levels * view_vectors.LEVELS), np.int16)
+
+
+def in_pairs(levels: NDArray[np.floating]) -> NDArray[np.int16]:
+    """Planes of luma (..., H, W) as the kernels take them: each pixel with the one below it."""
+    below = np.concatenate([levels[..., 1:, :], levels[..., -1:, :]], axis=-2)
+    return np.stack([in_steps(levels), in_steps(below)], axis=-1)

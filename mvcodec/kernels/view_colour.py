@@ -13,9 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvcodec.kernels.lanes import COUNT
 from mvcodec.kernels.view_fetch import BORDER, CONTOUR, corner_of, phase_of, place_of
-from mvcodec.kernels.view_marks import list_marked
-from mvcodec.kernels.view_vectors import add_edge, add_fetched, store_colour
+from mvcodec.kernels.view_runs import PLACES, add_run, first_of, marked, place_columns, place_rows, store_run
+from mvcodec.kernels.view_vectors import ONE, add_edge, add_fetched
 
 FloatMap = NDArray[np.float32]
 ByteMap = NDArray[np.uint8]
@@ -27,7 +28,7 @@ ByteMap = NDArray[np.uint8]
 @njit(cache=True, nogil=True, inline="always")
 def _see(x, y, d, shape, cameras, planes, shifts, weights, tolerance, edge_trust, fetching, sums):  # type: ignore[no-untyped-def]
     """Sum up what the cameras see of the view's point (x, y) at disparity d."""
-    luma, colour, depths, fetchable = planes
+    pairs, colour, depths, fetchable = planes
     height, width = shape
     stride, none = width + 2 * BORDER, np.uintp(0)
     sums[0] = sums[1] = sums[2] = sums[3] = np.float32(0)
@@ -42,7 +43,7 @@ def _see(x, y, d, shape, cameras, planes, shifts, weights, tolerance, edge_trust
                 corner, steps = corner_of(at_x, at_y, width, height)
                 corner += np.uintp(cameras[i] * height * width)
                 add_edge(
-                    luma,
+                    pairs,
                     colour,
                     depths,
                     fetching,
@@ -58,7 +59,7 @@ def _see(x, y, d, shape, cameras, planes, shifts, weights, tolerance, edge_trust
                     weight * edge_trust,
                 )
             elif abs(here - d) <= tolerance:
-                add_fetched(luma, colour, fetching, sums, none, place, below, phase, weight)
+                add_fetched(pairs, colour, fetching, sums, none, place, below, phase, weight)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -117,8 +118,56 @@ def _add_surfaces(y, chosen, seen, view_disparity, seeing, tolerance, sums):  # 
 
 
 @njit(cache=True, nogil=True)
-def _find_contours(y, view_disparity, tolerance, high, low, marks, chosen):  # type: ignore[no-untyped-def]
-    """Lists the pixels of a row whose 3 x 3 window holds more than one surface; their number."""
+def _add_edges(  # type: ignore[no-untyped-def]
+    planes, fetching, camera, weight, y, shift, shape, disparity, tolerance, chosen, sums, seen
+):
+    """Add what a camera sees at the chosen pixels of row y, at its contours."""
+    pairs, colour, own, _ = planes
+    height, width = shape
+    stride = width + 2 * BORDER
+    start, first = camera * (height + 2 * BORDER), np.uintp(camera * height * width)
+    for x in chosen:
+        d = disparity[x]
+        at_x, at_y, _ = place_of(x, y, d, shift[0], shift[1], width, height)
+        left, top = np.int32(at_x), np.int32(at_y)
+        phase = np.uintp(phase_of(at_x - np.float32(left), at_y - np.float32(top)))
+        place = np.uintp((start + top + BORDER) * stride + left + BORDER)
+        corner, steps = corner_of(at_x, at_y, width, height)
+        at, below = np.uintp(4) * np.uintp(x), np.uintp(stride)
+        corner += first
+        seen[x] += add_edge(
+            pairs, colour, own, fetching, sums, at, place, below, corner, steps, phase, d, tolerance, weight
+        )
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _list(bits, x, chosen, count):  # type: ignore[no-untyped-def]
+    """Append the pixels that the bits say from x on to a list; how long it is then."""
+    while bits:
+        chosen[count] = x + first_of(bits)
+        count += 1
+        bits &= bits - np.uint32(1)
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _distinct(shifts):  # type: ignore[no-untyped-def]
+    """The different ones among shifts, and which of them each is: cameras of one row or column share them."""
+    found, which = np.empty_like(shifts), np.empty(shifts.size, np.int64)
+    count = 0
+    for i in range(shifts.size):
+        which[i] = 0
+        while which[i] < count and found[which[i]] != shifts[i]:
+            which[i] += 1
+        if which[i] == count:
+            found[count] = shifts[i]
+            count += 1
+    return found[:count], which
+
+
+@njit(cache=True, nogil=True)
+def _mark_contours(y, view_disparity, tolerance, high, low, marks):  # type: ignore[no-untyped-def]
+    """Mark the pixels of a row whose 3 x 3 window holds more than one surface."""
     height, width = view_disparity.shape
     above, here = view_disparity[max(y - 1, 0)], view_disparity[y]
     below = view_disparity[min(y + 1, height - 1)]
@@ -126,66 +175,11 @@ def _find_contours(y, view_disparity, tolerance, high, low, marks, chosen):  # t
         high[x + 1] = max(max(above[x], here[x]), below[x])
         low[x + 1] = min(min(above[x], here[x]), below[x])
     for ends in (high, low):
-        ends[0], ends[-1] = ends[1], ends[-2]
+        ends[0], ends[width + 1] = ends[1], ends[width]
     for x in range(width):
         nearest = max(max(high[x], high[x + 1]), high[x + 2])
         farthest = min(min(low[x], low[x + 1]), low[x + 2])
         marks[x] = nearest - farthest > tolerance
-    return list_marked(marks, chosen)
-
-
-@njit(cache=True, nogil=True)
-def _locate(y, disparity, shift, shape, places, phases):  # type: ignore[no-untyped-def]
-    """Where a camera sees one row of the view: the pixels up left of there, -1 outside, and the phases."""
-    height, width = shape
-    stride = np.int32(width + 2 * BORDER)
-    shift_x, shift_y = shift
-    for x in range(width):  # vectorised
-        at_x, at_y, inside = place_of(x, y, disparity[x], shift_x, shift_y, width, height)
-        left, top = np.int32(at_x), np.int32(at_y)
-        phases[x] = phase_of(at_x - np.float32(left), at_y - np.float32(top))
-        place = (top + np.int32(BORDER)) * stride + left + np.int32(BORDER)
-        places[x] = place if inside else np.int32(-1)
-
-
-@njit(cache=True, nogil=True)
-def _add_clear(  # type: ignore[no-untyped-def]
-    planes, fetching, first, stride, weight, disparity, tolerance, places, phases, sums, seen, edges
-):
-    """Add what a camera sees of a row off its contours; lists the pixels at these, and gives their number."""
-    luma, colour, fetchable = planes
-    count = 0
-    for x in range(disparity.size):
-        if places[x] < 0:
-            continue
-        place = first + np.uintp(places[x])
-        here = fetchable[place]
-        if abs(here - disparity[x]) <= tolerance:
-            at = np.uintp(4) * np.uintp(x)
-            add_fetched(luma, colour, fetching, sums, at, place, stride, np.uintp(phases[x]), weight)
-            seen[x] += 1
-        elif here == CONTOUR:
-            edges[count] = x
-            count += 1
-    return count
-
-
-@njit(cache=True, nogil=True)
-def _add_edges(  # type: ignore[no-untyped-def]
-    planes, fetching, first, weight, y, shift, disparity, tolerance, chosen, places, phases, sums, seen
-):
-    """Add what a camera sees at the chosen pixels of row y, at its contours."""
-    luma, colour, own = planes
-    height, width = own.shape
-    flat, stride = own.ravel(), np.uintp(width + 2 * BORDER)
-    for x in chosen:
-        d = disparity[x]
-        at_x, at_y, _ = place_of(x, y, d, shift[0], shift[1], width, height)
-        corner, steps = corner_of(at_x, at_y, width, height)
-        place, at, phase = first + np.uintp(places[x]), np.uintp(4) * np.uintp(x), np.uintp(phases[x])
-        seen[x] += add_edge(
-            luma, colour, flat, fetching, sums, at, place, stride, corner, steps, phase, d, tolerance, weight
-        )
 
 
 @njit(cache=True, nogil=True)
@@ -197,6 +191,7 @@ def blend(
     view_disparity: FloatMap,
     tolerance: float,
     edge_trust: float,
+    sharpness: float,
     fetching: NDArray[np.int16],
     out: NDArray[np.uint8],
     seen_by: ByteMap,
@@ -212,68 +207,119 @@ def blend(
 
     Args:
         cameras: int64 (N,), which of the R real cameras see the view.
-        planes: of every real camera: luma int16 (R, H + 4, W + 4) and colour differences
-            (R, H + 4, W + 4, 2); disparity float32 (R, H, W), px, and where it can be fetched
-            (R, H + 4, W + 4); see `view_planes`.
+        planes: of every real camera, see `view_planes.make_room`.
         shifts: float32 (N, 2), px (x, y) from the view to the camera for each px of disparity.
         weights: float32 (N,), above 0.
         view_disparity: float32 (H, W), known everywhere.
         tolerance: px within which disparities are one surface.
-        fetching: weights of the cubic fetch of luma, see `view_vectors.fetch_weights`.
+        sharpness: Keys' parameter a of the cubic fetch of luma, -1..0.
+        fetching: weights of that, see `view_vectors.fetch_weights`.
         out: uint8 (H, W, 3) RGB, C-contiguous, rows first..last-1 overwritten; black where no camera
             sees the pixel.
         seen_by: uint8 (H, W), overwritten with the number of cameras; 0 where none sees the pixel.
     """
-    luma, colour, fetchable = planes[0].ravel(), planes[1].ravel(), planes[3].ravel()
-    disparities = planes[2]
-    shape = view_disparity.shape
-    height, width = shape
-    stride = width + 2 * BORDER
+    flat = planes[0].ravel(), planes[1].ravel(), planes[2].ravel(), planes[3].ravel()
+    pairs, colour, _, fetchable = flat
+    height, width = view_disparity.shape
+    stride, runs = width + 2 * BORDER, (width + COUNT - 1) // COUNT
     plane = (height + 2 * BORDER) * stride
     near_px, trust = np.float32(tolerance), np.float32(edge_trust)
-    seeing = cameras, (luma, colour, disparities.ravel(), fetchable), shifts, weights, trust, fetching
+    seeing = cameras, flat, shifts, weights, trust, fetching
+    whole_sharpness = np.int32(round(sharpness * ONE))
+    columns_apart, column_of = _distinct(shifts[:, 0])
+    rows_apart, row_of = _distinct(shifts[:, 1])
+    columns = np.empty(PLACES * columns_apart.size, np.int32)
+    rows = np.empty(PLACES * rows_apart.size, np.int32)
     high, low = np.empty(width + 2, np.float32), np.empty(width + 2, np.float32)
-    places, phases = np.empty(width, np.int32), np.empty(width, np.int32)
-    chosen = np.empty(width, np.int32)
-    sums, marks = np.empty((width, 4), np.float32), np.empty(width, np.uint8)
-    flat, pixels = sums.ravel(), out.ravel()
+    disparity, marks = np.full(width + COUNT, np.nan, np.float32), np.zeros(width + COUNT, np.uint8)
+    sums, seen = np.empty(4 * COUNT * runs, np.float32), np.empty(COUNT * runs, np.uint8)
+    few = np.empty(4 * width, np.float32)
+    edges, edge_counts = np.empty((cameras.size, width), np.int32), np.empty(cameras.size, np.int64)
+    contours, touched = np.empty(width, np.int32), np.empty(width, np.int32)
+    pixels, end = out.ravel(), np.empty(3 * COUNT, np.uint8)
     for y in range(first, last):
-        disparity, seen = view_disparity[y], seen_by[y]
+        disparity[:width] = view_disparity[y]
+        _mark_contours(y, view_disparity, near_px, high, low, marks)
         sums[:] = 0
         seen[:] = 0
+        edge_counts[:] = 0
+        contour_count = touched_count = 0
+        for x in range(0, width, COUNT):
+            bits = marked(marks, x)
+            contour_count = _list(bits, x, contours, contour_count)
+            for i in range(columns_apart.size):
+                place_columns(
+                    disparity,
+                    columns,
+                    PLACES * i,
+                    np.int32(x),
+                    np.int32(y),
+                    np.int32(width),
+                    columns_apart[i],
+                    np.int32(1),
+                    whole_sharpness,
+                )
+            for i in range(rows_apart.size):
+                place_rows(
+                    disparity,
+                    rows,
+                    PLACES * i,
+                    np.int32(x),
+                    np.int32(y),
+                    np.int32(height),
+                    rows_apart[i],
+                    np.int32(stride),
+                    whole_sharpness,
+                )
+            for i in range(cameras.size):
+                found = add_run(
+                    pairs,
+                    colour,
+                    fetchable,
+                    disparity,
+                    columns,
+                    rows,
+                    sums,
+                    seen,
+                    cameras[i] * plane + BORDER * stride + BORDER,
+                    stride,
+                    x,
+                    PLACES * column_of[i],
+                    PLACES * row_of[i],
+                    weights[i],
+                    near_px,
+                )
+                edge_counts[i] = _list(found, x, edges[i], edge_counts[i])
+                bits |= found
+            touched_count = _list(bits, x, touched, touched_count)
+        for x in touched[:touched_count]:
+            at = x // COUNT * 4 * COUNT + x % COUNT
+            for value in range(4):
+                few[4 * x + value] = sums[at + COUNT * value]
         for i in range(cameras.size):
-            start, shift = np.uintp(cameras[i] * plane), (shifts[i, 0], shifts[i, 1])
-            _locate(y, disparity, shift, shape, places, phases)
-            count = _add_clear(
-                (luma, colour, fetchable),
-                fetching,
-                start,
-                np.uintp(stride),
-                weights[i],
-                disparity,
-                near_px,
-                places,
-                phases,
-                flat,
-                seen,
-                chosen,
-            )
             _add_edges(
-                (luma, colour, disparities[cameras[i]]),
+                flat,
                 fetching,
-                start,
+                cameras[i],
                 weights[i] * trust,
                 y,
-                shift,
+                (shifts[i, 0], shifts[i, 1]),
+                view_disparity.shape,
                 disparity,
                 near_px,
-                chosen[:count],
-                places,
-                phases,
-                flat,
+                edges[i, : edge_counts[i]],
+                few,
                 seen,
             )
-        count = _find_contours(y, view_disparity, near_px, high, low, marks, chosen)
-        _add_surfaces(y, chosen[:count], seen, view_disparity, seeing, near_px, flat)
-        for x in range(width):
-            store_colour(flat, np.uintp(4) * np.uintp(x), pixels, np.uintp(3) * np.uintp(y * width + x))
+        _add_surfaces(y, contours[:contour_count], seen, view_disparity, seeing, near_px, few)
+        for x in touched[:touched_count]:
+            at = x // COUNT * 4 * COUNT + x % COUNT
+            for value in range(4):
+                sums[at + COUNT * value] = few[4 * x + value]
+        seen_by[y] = seen[:width]
+        for x in range(0, width - COUNT + 1, COUNT):
+            store_run(sums, 4 * x, pixels, 3 * (y * width + x))
+        rest = width % COUNT
+        if rest:
+            store_run(sums, 4 * (width - rest), end, 0)
+            pixels[3 * ((y + 1) * width - rest) : 3 * (y + 1) * width] = end[: 3 * rest]

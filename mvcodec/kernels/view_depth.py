@@ -96,7 +96,7 @@ def _denies(x, y, d, luma, camera, maps, lumas, shift, limits):  # type: ignore[
         return False
     for v in range(row + BORDER - 1, row + BORDER + 2):
         for u in range(column + BORDER - 1, column + BORDER + 2):
-            if abs(np.float32(lumas[camera, v, u]) - luma) <= contrast:
+            if abs(np.float32(lumas[camera, v, u, 0]) - luma) <= contrast:
                 return False
     return True
 
@@ -109,7 +109,7 @@ def _luma_of(x, y, d, who, cameras, lumas, shifts, weights):  # type: ignore[no-
     for i in who:
         column, row = _pixel(x, y, d, shifts[i])
         column, row = min(max(column, 0), width - 1), min(max(row, 0), height - 1)
-        mean += weights[i] * np.float32(lumas[cameras[i], row + BORDER, column + BORDER])
+        mean += weights[i] * np.float32(lumas[cameras[i], row + BORDER, column + BORDER, 0])
         total += weights[i]
     return mean / total
 
@@ -186,7 +186,7 @@ def vote(
         moved: float32 (N, H + 2, W + 2), px, or UNKNOWN; see `splat`.
         cameras: int64 (N,), which of the R real cameras were moved.
         maps: float32 (R, H, W), px, of every real camera.
-        lumas: int16 (R, H + 4, W + 4), see `view_planes.split_luma`; of any size where denial is 0.
+        lumas: int16 (R, H + 4, W + 4, 2), see `view_planes.split_luma`; of any size where denial is 0.
         shifts: float32 (N, 2), px (x, y) from the view to the camera for each px of disparity.
         weights: float32 (N,), of the cameras, above 0.
         out: float32 (H, W), rows first..last-1 overwritten; UNKNOWN where no camera knows.

@@ -2,14 +2,41 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvcodec.kernels.lanes import COUNT
 from mvcodec.kernels.view_fetch import BORDER, CONTOUR
 from mvcodec.kernels.view_vectors import LEVELS
 
 FloatMap = NDArray[np.float32]
+Planes = tuple[NDArray[np.int16], NDArray[np.int16], FloatMap, FloatMap]
+
+
+def make_room(count: int, height: int, width: int) -> Planes:
+    """Planes of `count` cameras, not yet filled.
+
+    Returns:
+        Luma, int16 (R, H + 2 BORDER, W + 2 BORDER, 2), each pixel with the one below it; colour differences
+        of that shape; disparity, float32 (R, H, W); and where it can be fetched, float32
+        (R, H + 2 BORDER, W + 2 BORDER). Before and behind them is memory that `view_runs` may read.
+    """
+    padded = count, height + 2 * BORDER, width + 2 * BORDER
+    return (
+        _reserve((*padded, 2), np.dtype(np.int16)),
+        _reserve((*padded, 2), np.dtype(np.int16)),
+        np.empty((count, height, width), np.float32),
+        _reserve(padded, np.dtype(np.float32)),
+    )
+
+
+def _reserve(shape: tuple[int, ...], kind: np.dtype[Any]) -> NDArray[Any]:
+    slack, size = 2 * COUNT, math.prod(shape)
+    return np.empty(size + 2 * slack, kind)[slack : slack + size].reshape(shape)
 
 
 @njit(cache=True, nogil=True)
@@ -18,35 +45,52 @@ def split_luma(picture: NDArray[np.uint8], luma: NDArray[np.int16], colour: NDAr
 
     Args:
         picture: uint8 (H, W, 3).
-        luma: int16 (H + 2 BORDER, W + 2 BORDER), overwritten with Y = .299 R + .587 G + .114 B.
+        luma: int16 (H + 2 BORDER, W + 2 BORDER, 2), overwritten with Y = .299 R + .587 G + .114 B of each
+            pixel and of the one below it; the last row has itself below it.
         colour: int16 (H + 2 BORDER, W + 2 BORDER, 2), overwritten with R - Y and B - Y.
     """
     height, width, _ = picture.shape
     levels, half = np.float32(LEVELS), np.float32(0.5)
-    grey, red, blue = np.empty(width, np.int32), np.empty(width, np.int32), np.empty(width, np.int32)
+    grey, above = np.empty((2, width), np.int32)
+    red, blue = np.empty((2, width), np.int32)
     for y in range(height):
-        row, greys = picture[y].ravel(), luma[y + BORDER, BORDER:-BORDER]
+        row, pairs = picture[y].ravel(), luma[y + BORDER - 1, BORDER:-BORDER].ravel()
         differences = colour[y + BORDER, BORDER:-BORDER].ravel()
+        above[:] = grey
         for x in range(width):  # three loops: each is vectorised by itself
             r, g, b = np.float32(row[3 * x]), np.float32(row[3 * x + 1]), np.float32(row[3 * x + 2])
             sum_ = np.float32(0.299) * r + np.float32(0.587) * g + np.float32(0.114) * b
             grey[x] = np.int32(levels * sum_ + half)
             red[x], blue[x] = np.int32(levels * r) - grey[x], np.int32(levels * b) - grey[x]
+        if y == 0:
+            above[:] = grey
         for x in range(width):
-            greys[x] = np.int16(grey[x])
+            pairs[2 * x], pairs[2 * x + 1] = np.int16(above[x]), np.int16(grey[x])
         for x in range(width):
             differences[2 * x], differences[2 * x + 1] = np.int16(red[x]), np.int16(blue[x])
-    _repeat_edges(luma)
+    pairs = luma[height + BORDER - 1, BORDER:-BORDER].ravel()
+    for x in range(width):
+        pairs[2 * x], pairs[2 * x + 1] = np.int16(grey[x]), np.int16(grey[x])
+    _repeat_sides(luma)
+    for y in range(BORDER):  # of pairs, the first and the last with one pixel twice are these
+        luma[y] = luma[BORDER - 1]
+        luma[height + BORDER + y] = luma[height + BORDER - 1]
     _repeat_edges(colour)
+
+
+@njit(cache=True, nogil=True)
+def _repeat_sides(plane):  # type: ignore[no-untyped-def]
+    """Fill the columns at both ends of a plane, BORDER wide, with the pixels beside them."""
+    for y in range(plane.shape[0]):
+        for x in range(BORDER):
+            plane[y, x] = plane[y, BORDER]
+            plane[y, plane.shape[1] - 1 - x] = plane[y, plane.shape[1] - 1 - BORDER]
 
 
 @njit(cache=True, nogil=True)
 def _repeat_edges(plane):  # type: ignore[no-untyped-def]
     """Fill the border of a plane, BORDER wide, with the pixels beside it."""
-    for y in range(BORDER, plane.shape[0] - BORDER):
-        for x in range(BORDER):
-            plane[y, x] = plane[y, BORDER]
-            plane[y, plane.shape[1] - 1 - x] = plane[y, plane.shape[1] - 1 - BORDER]
+    _repeat_sides(plane)
     for y in range(BORDER):
         plane[y] = plane[BORDER]
         plane[plane.shape[0] - 1 - y] = plane[plane.shape[0] - 1 - BORDER]

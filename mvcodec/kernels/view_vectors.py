@@ -33,21 +33,22 @@ ONE = 1 << 14
 """What the weights of a fetch sum up to."""
 
 SHARES = 24
-"""Weights of one place: 4 x 4 of luma by rows; then of the 2 x 2 pixels of colour, see `fetch_weights`."""
+"""Weights of one place: 4 x 4 of luma, then of the 2 x 2 pixels of colour, see `fetch_weights`."""
 
 
 @cache
 def fetch_weights(a: float) -> NDArray[np.int16]:
     """int16 (PHASES^2 * SHARES,), in 1 / ONE: what the pixels around each place between pixels count.
 
-    Luma by cubic convolution (Keys 1981, equation 15, with its parameter a), colour linearly: for each of the
-    two columns its upper and its lower pixel, twice. Places are counted as `view_fetch.phase_of` does.
+    Luma by cubic convolution (Keys 1981, equation 15, with its parameter a), the upper two rows and then the
+    lower two, column by column; colour linearly: for each of the two columns its upper and its lower pixel,
+    twice. Places are counted as `view_fetch.phase_of` does.
     """
     t = np.arange(PHASES) / STEPS
     cubes, squares = [a, a + 2, -(a + 2), -a], [-2 * a, -(a + 3), 2 * a + 3, a]
     cubic = np.stack([t**3, t**2, t, t**0], axis=1) @ np.array([cubes, squares, [a, 0, -a, 0], [0, 1, 0, 0]])
     linear = np.stack([1 - t, t], axis=1)
-    luma = np.einsum("yj,xi->yxji", cubic, cubic).reshape(-1, 16)
+    luma = np.einsum("yhj,xi->yxhij", cubic.reshape(-1, 2, 2), cubic).reshape(-1, 16)
     colour = np.einsum("yj,xi->yxij", linear, linear).reshape(-1, 2, 1, 2).repeat(2, axis=2)
     whole = np.rint(luma * ONE).astype(np.int16)
     whole[np.arange(len(whole)), luma.argmax(axis=1)] += (ONE - whole.sum(axis=1)).astype(np.int16)
@@ -113,7 +114,24 @@ def _luma(builder, plane, weights, share, place, stride):  # type: ignore[no-unt
         at = builder.add(share, ir.Constant(share.type, 8 * half))
         product = _dot(builder, pixels, _shorts(builder, weights, at, 8))
         total = product if total is None else builder.add(total, product)
-    pairs = builder.add(total, _shuffle(builder, total, total, [2, 3, 0, 1]))
+    return _sum(builder, total)
+
+
+def _luma_of_pairs(builder, pairs, weights, share, place, stride):  # type: ignore[no-untyped-def]
+    """The same from a plane of pairs, each pixel with the one below it, and weights in that order."""
+    one = ir.Constant(place.type, 1)
+    total = None
+    for half, line in enumerate((builder.sub(place, stride), builder.add(place, stride))):
+        pixels = _shorts(builder, pairs, builder.shl(builder.sub(line, one), one), 8)
+        at = builder.add(share, ir.Constant(share.type, 8 * half))
+        product = _dot(builder, pixels, _shorts(builder, weights, at, 8))
+        total = product if total is None else builder.add(total, product)
+    return _sum(builder, total)
+
+
+def _sum(builder, vector):  # type: ignore[no-untyped-def]
+    """The sum of four lanes, in all of them."""
+    pairs = builder.add(vector, _shuffle(builder, vector, vector, [2, 3, 0, 1]))
     return builder.add(pairs, _shuffle(builder, pairs, pairs, [1, 0, 3, 2]))
 
 
@@ -128,26 +146,26 @@ def _colour(builder, plane, weights, share, place, stride):  # type: ignore[no-u
     return builder.add(columns, _shuffle(builder, columns, columns, [2, 3, 0, 1]))
 
 
-def _add_fetched(_typing, luma, colour, weights, sums, at, place, stride, phase, weight):  # type: ignore[no-untyped-def]
+def _add_fetched(_typing, pairs, colour, weights, sums, at, place, stride, phase, weight):  # type: ignore[no-untyped-def]
     """Add weight * (Y, R - Y, B - Y, 1) of one place between pixels to four of `sums` from index `at` on.
 
     Args:
-        luma, colour: flat int16 planes with borders, see `view_planes`; fetched cubic and linear.
+        pairs, colour: flat int16 planes with borders, see `view_planes`; fetched cubic and linear.
         weights: see `fetch_weights`.
         sums: flat float32.
-        at, place, stride: uintp; index into `sums`, of the pixel up left in `luma`, and pixels of its rows.
+        at, place, stride: uintp; index into `sums`, of the pixel up left in the planes, and pixels of a row.
         phase: uintp, where between the pixels, see `view_fetch.phase_of`.
         weight: float32.
     """
 
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        luma, colour, weights, sums = (
+        pairs, colour, weights, sums = (
             context.make_array(kind)(context, builder, value).data
             for kind, value in zip(signature.args[:4], values[:4], strict=True)
         )
         at, place, stride, phase, weight = values[4:]
         share = builder.mul(phase, ir.Constant(phase.type, SHARES))
-        grey = _luma(builder, luma, weights, share, place, stride)
+        grey = _luma_of_pairs(builder, pairs, weights, share, place, stride)
         differences = _colour(builder, colour, weights, share, place, stride)
         pixel = _shuffle(builder, grey, differences, [0, 4, 5, 0])
         unit = LEVELS * ONE
@@ -157,7 +175,7 @@ def _add_fetched(_typing, luma, colour, weights, sums, at, place, stride, phase,
         builder.store(total, _address(builder, sums, at), align=WORD_BYTES)
         return context.get_dummy_value()
 
-    arguments = luma, colour, weights, sums, at, place, stride, phase, weight
+    arguments = pairs, colour, weights, sums, at, place, stride, phase, weight
     return types.void(*arguments), generate
 
 
@@ -201,7 +219,7 @@ def _pointers(context, builder, signature, values):  # type: ignore[no-untyped-d
 
 
 def _add_edge(  # type: ignore[no-untyped-def]
-    _typing, luma, colour, own, weights, sums, at, place, stride, here, steps, phase, d, tolerance, weight
+    _typing, pairs, colour, own, weights, sums, at, place, stride, here, steps, phase, d, tolerance, weight
 ):
     """Add weight * (Y, R - Y, B - Y, 1) of one place to four of `sums`, as `add_fetched` does, but linear
     between those of the four pixels there that lie at disparity d, each by its share; 1 if there is any.
@@ -213,7 +231,7 @@ def _add_edge(  # type: ignore[no-untyped-def]
     """
 
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        luma, colour, own, weights, sums = (
+        pairs, colour, own, weights, sums = (
             context.make_array(kind)(context, builder, value).data
             for kind, value in zip(signature.args[:5], values[:5], strict=True)
         )
@@ -234,9 +252,8 @@ def _add_edge(  # type: ignore[no-untyped-def]
         linear = builder.sext(_shuffle(builder, linear, linear, [0, 1, 4, 5]), words)
         parts = builder.select(builder.or_(far, low), ir.Constant(words, [0] * 4), linear)
         below = builder.add(place, stride)
-        above, under = _shorts(builder, luma, place, 2), _shorts(builder, luma, below, 2)
-        grey = _shuffle(builder, above, under, [0, 2, 1, 3])
         two = ir.Constant(place.type, 2)
+        grey = _shorts(builder, pairs, builder.mul(place, two), 4)
         above, under = (_shorts(builder, colour, builder.mul(row, two), 4) for row in (place, below))
         red, blue = (_shuffle(builder, above, under, lanes) for lanes in ([0, 4, 2, 6], [1, 5, 3, 7]))
         products = [builder.mul(parts, builder.sext(plane, words)) for plane in (grey, red, blue)] + [parts]
@@ -259,16 +276,8 @@ def _add_edge(  # type: ignore[no-untyped-def]
         builder.store(total, _address(builder, sums, at), align=WORD_BYTES)
         return builder.zext(seen, ir.IntType(8))
 
-    arguments = luma, colour, own, weights, sums, at, place, stride, here, steps, phase, d, tolerance, weight
+    arguments = pairs, colour, own, weights, sums, at, place, stride, here, steps, phase, d, tolerance, weight
     return types.uint8(*arguments), generate
-
-
-def _clip(builder, numbers, low, high):  # type: ignore[no-untyped-def]
-    """Numbers kept within low..high."""
-    for sign, limit in ((">", low), ("<", high)):
-        edge = ir.Constant(FOUR, [limit] * 4)
-        numbers = builder.select(builder.fcmp_ordered(sign, numbers, edge), numbers, edge)
-    return numbers
 
 
 def store_bytes(builder, numbers, pointer, index):  # type: ignore[no-untyped-def]
@@ -280,39 +289,7 @@ def store_bytes(builder, numbers, pointer, index):  # type: ignore[no-untyped-de
         builder.store(byte, builder.gep(pointer, [builder.add(index, ir.Constant(index.type, lane))]))
 
 
-def _store_colour(_typing, sums, at, pixels, place):  # type: ignore[no-untyped-def]
-    """Store a pixel as RGB, rounded and kept within 0..255.
-
-    Args:
-        sums: flat float32; weighted sums of Y, R - Y and B - Y and the sum of weights, from index `at`
-            (uintp) on. Where no weight is, the pixel is black.
-        pixels: flat uint8, stored from index `place` (uintp) on.
-    """
-
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        sums, pixels = (
-            context.make_array(kind)(context, builder, value).data
-            for kind, value in zip(signature.args[::2], values[::2], strict=True)
-        )
-        found = _load(builder, sums, values[1])
-        weight = builder.extract_element(found, ir.Constant(ir.IntType(32), 3))
-        none = builder.fcmp_ordered("==", weight, ir.Constant(ir.FloatType(), 0.0))
-        one = ir.Constant(ir.FloatType(), 1.0)
-        scale = builder.fdiv(one, builder.select(none, one, weight))
-        found = builder.fmul(found, fill(builder, scale))
-        colour = _pick(builder, found, 0, 0, 0, 0)
-        for lane, parts in ((1, [1.0, -0.299 / 0.587, 0.0, 0.0]), (2, [0.0, -0.114 / 0.587, 1.0, 0.0])):
-            difference = _pick(builder, found, lane, lane, lane, lane)
-            colour = add_product(builder, colour, difference, ir.Constant(FOUR, parts))
-        rounded = builder.fadd(colour, ir.Constant(FOUR, [0.5] * 4))
-        store_bytes(builder, _clip(builder, rounded, 0.0, 255.0), pixels, values[3])
-        return context.get_dummy_value()
-
-    return types.void(sums, at, pixels, place), generate
-
-
 add_fetched: Any = intrinsic(_add_fetched)
 add_edge: Any = intrinsic(_add_edge)
 fetch_luma: Any = intrinsic(_fetch_luma)
 fetch_colour: Any = intrinsic(_fetch_colour)
-store_colour: Any = intrinsic(_store_colour)

@@ -75,20 +75,16 @@ class LayeredSettings:
 class _Sources:
     """The real cameras of one decoded set, prepared for fetching when a view first needs them.
 
-    The arrays are those of `kernels.view_colour.blend`, indexed by place in `array.real`.
+    `planes` are those of `kernels.view_planes`, indexed by place in `array.real`.
     """
 
     def __init__(self, decoded: DecodedSet, spread: float | None) -> None:
-        from mvcodec.kernels.view_fetch import BORDER
+        from mvcodec.kernels.view_planes import make_room
 
-        height, width, count = decoded.array.height, decoded.array.width, len(decoded.array.real)
-        padded = (count, height + 2 * BORDER, width + 2 * BORDER)
+        array = decoded.array
         self.decoded = decoded
         self.spread = measure_spread(decoded) if spread is None else spread
-        self.lumas = np.empty(padded, np.int16)
-        self.colours = np.empty((*padded, 2), np.int16)
-        self.disparities = np.empty((count, height, width), np.float32)
-        self.fetchable = np.empty(padded, np.float32)
+        self.planes = make_room(len(array.real), array.height, array.width)
         self._ready: set[Position] = set()
         self._lock = threading.Lock()
 
@@ -103,15 +99,11 @@ class _Sources:
         from mvcodec.kernels.view_planes import mark_contours, split_luma
 
         place = self.decoded.array.real.index(camera)
-        split_luma(self.decoded.pictures[camera], self.lumas[place], self.colours[place])
+        lumas, colours, disparities, fetchable = self.planes
+        split_luma(self.decoded.pictures[camera], lumas[place], colours[place])
         values = self.decoded.disparities[camera].values_px
-        self.disparities[place] = values
-        mark_contours(values, tolerance_px, self.fetchable[place])
-
-    @property
-    def planes(self) -> tuple[NDArray[np.int16], NDArray[np.int16], FloatMap, FloatMap]:
-        """The arrays in the order of `kernels.view_colour.blend`."""
-        return self.lumas, self.colours, self.disparities, self.fetchable
+        disparities[place] = values
+        mark_contours(values, tolerance_px, fetchable[place])
 
 
 class Layered:
@@ -145,8 +137,8 @@ class Layered:
         with threads(self._threads):
             sources, cameras = self._prepared(decoded, viewpoint)
             disparity = view_disparity(
-                sources.disparities,
-                sources.lumas,
+                sources.planes[2],
+                sources.planes[0],
                 cameras,
                 self._ballot,
                 decoded.disparity_range_px[0],
@@ -188,6 +180,7 @@ class Layered:
             disparity,
             settings.tolerance_px,
             settings.edge_trust,
+            settings.sharpness,
             view_vectors.fetch_weights(settings.sharpness),
             pixels,
             seen_by,

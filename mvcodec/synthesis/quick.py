@@ -23,7 +23,7 @@ TOLERANCE_PX = 1.5
 BALLOT = Ballot(tolerance_px=TOLERANCE_PX, ratio=1.3, contrast=0.0, denial=0.0, reach_px=0.54)
 HOLE_REACH_PX = 32
 
-NO_LUMA = np.empty((0, 0, 0), np.int16)
+NO_LUMA = np.empty((0, 0, 0, 2), np.int16)
 """Nobody denies a surface, so that no picture is looked at for the vote."""
 
 

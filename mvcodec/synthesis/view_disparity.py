@@ -36,7 +36,7 @@ def view_disparity(
 
     Args:
         maps: float32 (R, H, W), px, of every real camera.
-        lumas: int16 (R, H + 4, W + 4), see `mvcodec.kernels.view_planes`; not looked at where nothing may
+        lumas: int16 (R, H + 4, W + 4, 2), see `mvcodec.kernels.view_planes`; not looked at where nothing may
             be denied.
         background_px: disparity of rows of which no camera knows anything.
 
