@@ -34,11 +34,11 @@ TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 COUNT = """async () => {
     const player = document.querySelector("mvcodec-player");
     await player.ready;
-    const canvas = player.shadowRoot.querySelector("canvas.picture");
+    const canvases = [...player.shadowRoot.querySelectorAll("canvas.picture, canvas.draft")];
     window.tally = { pictures: 0, widths: 0 };
     player.addEventListener("frame", () => {
         window.tally.pictures++;
-        window.tally.widths += canvas.width;
+        window.tally.widths += canvases.findLast((canvas) => !canvas.hidden).width;
     });
     player.play();
 }"""

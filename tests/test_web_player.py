@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import http.client
 
 import numpy as np
 import pytest
 from browser_page import CHROMIUM, NO_CHROMIUM, pixels_of, screenshot, settled, shown, waits_for
-from player_files import Running
+from player_files import Running, decode_picture
 from playwright.sync_api import Page, expect
 from web_fixtures import SAMPLE, Site, open_player
 
@@ -101,6 +102,23 @@ def test_a_picture_that_is_held_gets_all_detail_when_it_is_let_go(sample_page: P
     sample_page.wait_for_function("() => performance.now() > window.heldUntil")
     sample_page.mouse.up()
     sample_page.wait_for_function("() => window.stoodAt > window.heldUntil")
+
+
+def test_a_picture_that_moves_is_a_draft_on_a_small_canvas_and_one_that_stands_is_not(
+    sample_page: Page,
+) -> None:
+    sample_page.mouse.move(480, 250)
+    sample_page.mouse.down()
+    sample_page.mouse.move(400, 250, steps=4)
+    draft = sample_page.locator("canvas.draft")
+    expect(draft).to_be_visible()
+    coded = draft.evaluate("(canvas) => canvas.toDataURL('image/png').split(',')[1]")
+    shown_there = decode_picture(np.frombuffer(base64.b64decode(coded), np.uint8))
+    assert shown_there.shape == (48, 64, 3)
+    assert np.array_equal(shown_there, pixels_of(sample_page, fine=False))
+    sample_page.mouse.up()
+    settled(sample_page)
+    expect(draft).to_be_hidden()
 
 
 def test_the_wheel_moves_ahead_and_holes_stay_few(sample_page: Page) -> None:

@@ -49,6 +49,16 @@ export function viewsShown(header: Header, { view, eyes, focus }: Shown): Viewpo
   return eyesOf(header, view, eyes);
 }
 
+/** One view as it is, without any of what shaders add. */
+export function isPlain({ look, eyes, focus }: Shown): boolean {
+  return look === "picture" && eyes.mode === "one" && focus === undefined;
+}
+
+/** A share of the picture's size each way, px. */
+export function sizeOf({ width, height }: Header, share: number): [number, number] {
+  return [Math.max(Math.round(width * share), 1), Math.max(Math.round(height * share), 1)];
+}
+
 /** Draw what is to be shown on the canvas, with a share of the picture's size each way. */
 export function drawShown(
   renderer: ViewRenderer, canvas: HTMLCanvasElement, header: Header,
@@ -57,8 +67,7 @@ export function drawShown(
   const { mode } = shown.eyes;
   const [across, down] = mode === "nine" ? [3, 3] : mode === "side by side" ? [2, 1] : [1, 1];
   const scale = mode === "nine" ? Math.min(detail, NINE_SIZE[0] / (3 * header.width), NINE_SIZE[1] / (3 * header.height)) : detail;
-  const width = Math.max(Math.round(header.width * scale), 1);
-  const height = Math.max(Math.round(header.height * scale), 1);
+  const [width, height] = sizeOf(header, scale);
   if (canvas.width !== width * across || canvas.height !== height * down) {
     canvas.width = width * across;
     canvas.height = height * down;

@@ -23,6 +23,7 @@ export interface Place {
 
 /** Frames count from 0; times are seconds from the first one. Promises resolve when what is asked for is on the screen. */
 export interface Engine {
+  /** Shows pictures that stand, and those that move unless they are shown elsewhere; see `record`. */
   readonly canvas: HTMLCanvasElement;
   readonly isOpen: boolean;
   readonly isClosed: boolean;
@@ -64,6 +65,8 @@ export interface Engine {
   pause(): void;
   setSpeed(speed: number): void;
   setSection(section: Section | undefined): void;
+  /** Everything that is shown goes to `canvas`, or not all of it. */
+  record(isRecorded: boolean): void;
   /** The picture is held, as by a pointer that drags it: it does not come to stand. */
   hold(isHeld: boolean): void;
   /** The view at picture size: as it stands or, not `fine`, as it moves. Throws Error before the first picture. */

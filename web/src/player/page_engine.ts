@@ -230,6 +230,10 @@ export class PageEngine implements Engine {
     this.#painting?.hold(isHeld);
   }
 
+  record(isRecorded: boolean): void {
+    if (this.#painting !== undefined) this.#painting.isRecorded = isRecorded;
+  }
+
   async immerse(): Promise<void> {
     if (this.#painting === undefined) throw new Error("no file is open");
     const due = (now: number, views: readonly Viewpoint[]) => this.#due(now, views);

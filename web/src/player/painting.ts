@@ -5,7 +5,8 @@ import { depthOf, type Viewpoint } from "../geometry.ts";
 import type { CameraFrame } from "../synthesis/camera_textures.ts";
 import { finished, forgetPrograms } from "../synthesis/gl.ts";
 import { ViewRenderer, type Pixels } from "../synthesis/renderer.ts";
-import { drawShown } from "./drawing.ts";
+import { DraftCanvas } from "./draft_canvas.ts";
+import { drawShown, isPlain, sizeOf } from "./drawing.ts";
 import type { Place } from "./engine.ts";
 import { measure, type Originals } from "./originals.ts";
 import { placed, type Shown } from "./shown.ts";
@@ -30,11 +31,14 @@ export class Painting {
   readonly tempo = new Tempo();
   /** Luma PSNR of the picture that stands against its original, dB; undefined where they are not compared. */
   psnr: number | undefined;
+  /** The canvas is recorded: drafts go there too. */
+  isRecorded = false;
   readonly #canvas: HTMLCanvasElement;
   readonly #header: Header;
   readonly #originals: Originals | undefined;
   readonly #subject: Subject;
   readonly #standing = new Standing(() => this.#stands());
+  readonly #draft = new DraftCanvas();
   #renderer: ViewRenderer;
   /** What is on the screen has all detail; what is drawn next is to have it. */
   #isFinal = false;
@@ -49,6 +53,7 @@ export class Painting {
     this.#originals = originals;
     this.#subject = subject;
     this.#renderer = new ViewRenderer(canvas, header);
+    canvas.after(this.#draft.canvas);
   }
 
   get renderer(): ViewRenderer {
@@ -116,6 +121,7 @@ export class Painting {
   close(): void {
     this.#standing.close();
     this.#renderer.delete();
+    this.#draft.canvas.remove();
   }
 
   get #frames(): readonly CameraFrame[] | undefined {
@@ -131,7 +137,14 @@ export class Painting {
     this.#isFinal = isFinal;
     this.#drawnView = this.#subject.shown.view;
     const detail = isFinal ? 1 : this.tempo.detail;
-    drawShown(this.#renderer, this.#canvas, this.#header, this.#frames, placed(this.#subject.shown), detail, isFinal);
+    const shown = placed(this.#subject.shown);
+    if (!isFinal && isPlain(shown) && !this.isRecorded) {
+      const [width, height] = sizeOf(this.#header, detail);
+      this.#draft.show(this.#renderer.draft(this.#frames, shown.view, shown.dolly, width, height), width, height);
+      return;
+    }
+    this.#draft.hide();
+    drawShown(this.#renderer, this.#canvas, this.#header, this.#frames, shown, detail, isFinal);
   }
 
   /** Whether pictures in all detail are worth a try while it moves, as it may do from the start. */

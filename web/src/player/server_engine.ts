@@ -183,6 +183,8 @@ export class ServerEngine implements Engine {
 
   hold(): void {} // the server makes whole pictures when nothing has moved for a while
 
+  record(): void {} // all of it is there
+
   /** As it came, with what JPEG does to it. */
   pixels(): Pixels {
     const context = this.canvas.getContext("2d");

@@ -40,9 +40,10 @@ async function saveClip(canvas: HTMLCanvasElement, seconds: number, name: string
 export async function saveLoop(engine: Engine): Promise<void> {
   const { header, playback } = engine;
   const { from, to } = playback.section ?? { from: 0, to: engine.timeOf(engine.count - 1) + 1 / header.fps };
+  engine.record(true);
   await engine.seek(engine.frameAt(from));
   engine.play();
-  await saveClip(engine.canvas, Math.max((to - from) / playback.speed, 0.2), header.name || "view");
+  await saveClip(engine.canvas, Math.max((to - from) / playback.speed, 0.2), header.name || "view").finally(() => engine.record(false));
 }
 
 /** The page's address with a view and a time, which leads back to them. */

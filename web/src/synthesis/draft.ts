@@ -33,7 +33,7 @@ const BLACK = Math.round(ONE * (CLAMP_FROM + 0.5 - 16 * (255 / 219)));
 
 export class Draft {
   readonly #header: Header;
-  readonly #pixels: Uint32Array;
+  readonly #pixels: Uint32Array<ArrayBuffer>;
   /** By code value: disparity, and how much it is enlarged ahead of the cameras' plane. */
   readonly #px = new Float32Array(256);
   readonly #scale = new Float32Array(256);
@@ -66,7 +66,7 @@ export class Draft {
    *
    * The camera that counts most comes first. What is returned holds until the next call.
    */
-  make(cameras: readonly DraftCamera[], dolly: number, offset: readonly [number, number], width: number, height: number): Uint8Array {
+  make(cameras: readonly DraftCamera[], dolly: number, offset: readonly [number, number], width: number, height: number): Uint8Array<ArrayBuffer> {
     this.#step = width < this.#header.width ? SMALLER_STEP : STEP;
     this.#across = Math.ceil(this.#header.width / this.#step);
     this.#down = Math.ceil(this.#header.height / this.#step);

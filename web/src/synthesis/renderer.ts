@@ -97,13 +97,14 @@ export class ViewRenderer {
    * `frames` are those of the cell's cameras that have a picture; they are uploaded where they are new.
    */
   draw(frames: readonly CameraFrame[], view: Viewpoint, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
-    const at = (frame: CameraFrame, row: number, col: number) => frame.camera.row === row && frame.camera.col === col;
-    const seeing = contributors(this.#header, view, ({ row, col }) => frames.some((frame) => at(frame, row, col)));
-    const own = seeing.find(({ camera }) => camera.row === view.row && camera.col === view.col);
-    const used = own === undefined || settings.dolly !== 0 ? seeing.sort((a, b) => b.weight - a.weight) : [own];
-    const cameras = used.map(({ camera, shift, weight }) => ({ frame: frames.find((one) => at(one, camera.row, camera.col))!, shift, weight }));
+    const cameras = this.#seeing(frames, view, settings.dolly);
     if (!settings.fine && settings.look === "picture" && !settings.raw) this.#drawDraft(cameras, settings, area, target);
     else this.#drawView(cameras, settings, area, target);
+  }
+
+  /** A draft of a view, for whoever shows it: RGBA, rows from the top. What is returned holds until the next draft. */
+  draft(frames: readonly CameraFrame[], view: Viewpoint, dolly: number, width: number, height: number): Uint8Array<ArrayBuffer> {
+    return this.#draft.make(this.#seeing(frames, view, dolly), dolly, [0, 0], width, height);
   }
 
   /** Disparity of one pixel of a view, px, and whether any camera sees it. */
@@ -151,6 +152,15 @@ export class ViewRenderer {
   delete(): void {
     for (const texture of [this.#near, this.#far, this.#originalTexture, this.#draftTexture]) texture.delete();
     this.#cameras.delete();
+  }
+
+  /** The cameras that have a share in a view, the one that counts most first. */
+  #seeing(frames: readonly CameraFrame[], view: Viewpoint, dolly: number): DraftCamera[] {
+    const at = (frame: CameraFrame, row: number, col: number) => frame.camera.row === row && frame.camera.col === col;
+    const seeing = contributors(this.#header, view, ({ row, col }) => frames.some((frame) => at(frame, row, col)));
+    const own = seeing.find(({ camera }) => camera.row === view.row && camera.col === view.col);
+    const used = own === undefined || dolly !== 0 ? seeing.sort((a, b) => b.weight - a.weight) : [own];
+    return used.map(({ camera, shift, weight }) => ({ frame: frames.find((one) => at(one, camera.row, camera.col))!, shift, weight }));
   }
 
   #drawDraft(cameras: readonly DraftCamera[], settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
