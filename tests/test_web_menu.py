@@ -9,7 +9,17 @@ import av
 import cv2
 import numpy as np
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM, drop, pixels_of, set_slider, settled, toggle_menu, waits_for
+from browser_page import (
+    CHROMIUM,
+    NO_CHROMIUM,
+    drop,
+    pixels_of,
+    set_slider,
+    settled,
+    shown,
+    toggle_menu,
+    waits_for,
+)
 from numpy.typing import NDArray
 from player_files import Running, decode_picture
 from playwright.sync_api import Browser, Page, expect
@@ -135,6 +145,21 @@ def test_two_fingers_move_ahead(sample_page: Page) -> None:
     fingers("touchMove", 300, 660)
     fingers("touchEnd")
     waits_for(sample_page, "shown.dolly > 0")
+
+
+def test_a_finger_shows_the_controls_and_hides_them(sample_page: Page) -> None:
+    touch = sample_page.context.new_cdp_session(sample_page)
+
+    def tap() -> None:
+        touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": 300, "y": 200}]})
+        touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+    sample_page.mouse.move(300, 200)
+    tap()
+    sample_page.wait_for_selector(".stage.idle")
+    assert not shown(sample_page)["isPlaying"], "it does not play, as a click of the mouse would"
+    tap()
+    sample_page.wait_for_selector(".stage:not(.idle)")
 
 
 def test_an_element_with_autoplay_plays(tab: Page, site: Site) -> None:

@@ -11,7 +11,8 @@ export interface GestureEvents {
   onHover(at: { x: number; y: number } | undefined): void;
   /** Ahead, or back where negative. */
   onDolly(by: number): void;
-  onClick(): void;
+  /** `isFinger`: or else a mouse or a pen. */
+  onClick(isFinger: boolean): void;
   onDoubleClick(): void;
 }
 
@@ -98,7 +99,7 @@ export class Gestures {
     if (this.#clicked === undefined) {
       this.#clicked = setTimeout(() => {
         this.#clicked = undefined;
-        this.#events.onClick();
+        this.#events.onClick(event.pointerType === "touch");
       }, DOUBLE_MS);
     } else {
       clearTimeout(this.#clicked);

@@ -19,14 +19,19 @@ export class Idle {
   end(): void {
     this.#stage.classList.remove("idle");
     clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => this.#begin(), IDLE_MS);
+    this.#timer = setTimeout(() => this.begin(), IDLE_MS);
   }
 
   close(): void {
     clearTimeout(this.#timer);
   }
 
-  #begin(): void {
+  get isOn(): boolean {
+    return this.#stage.classList.contains("idle");
+  }
+
+  /** Hide now, unless something is used. */
+  begin(): void {
     const isUsed = this.#bars.some((bar) => bar.matches(":hover") || bar.querySelector(":focus-visible") !== null);
     if (!isUsed && this.#menu.hidden) this.#stage.classList.add("idle");
   }

@@ -52,6 +52,8 @@ export class Ui {
   #hasPlayed = false;
   #updatedAt = 0;
   readonly #idle: Idle;
+  /** The controls were hidden when the picture was touched last. */
+  #wasIdle = false;
   /** What stands above the bar must know how many rows it has. */
   readonly #barSize = new ResizeObserver(() => {
     for (const box of [this.#map.box, this.controls.menu]) box.style.setProperty("--bar", `${this.controls.bar.offsetHeight}px`);
@@ -68,20 +70,24 @@ export class Ui {
     this.#big.hidden = true;
     this.#stage.append(this.#poster);
     const middle = element("div", { class: "middle" }, this.#wait, this.#big);
-    root.append(this.#stage, middle, this.#hint, this.#stats, this.#probe.label, this.#map.box, this.controls.bar, this.controls.menu,
-      this.#notice.box, this.#legend.box, this.#spoken, this.#dialog, this.#incoming.input);
+    const top = element("div", { class: "top" }, this.#stats, this.#notice.box, this.#legend.box);
+    root.append(this.#stage, middle, this.#hint, top, this.#probe.label, this.#map.box, this.controls.bar, this.controls.menu,
+      this.#spoken, this.#dialog, this.#incoming.input);
   }
 
   connect(): void {
     this.#stop = new AbortController();
     const { signal } = this.#stop;
     this.#gestures = new Gestures(this.#stage, {
-      onTouch: () => this.endSway(),
+      onTouch: () => {
+        this.#wasIdle = this.#idle.isOn;
+        this.endSway();
+      },
       onHold: (isHeld) => this.#engine?.hold(isHeld),
       onDrag: (across, down) => this.commands.looking.drag(across, down),
       onHover: (at) => this.#hover(at),
       onDolly: (by) => this.commands.dolly(by),
-      onClick: () => this.#click(),
+      onClick: (isFinger) => this.#click(isFinger),
       onDoubleClick: () => this.toggleFullscreen(),
     });
     // The page listens everywhere, an element within another page only where it has the focus.
@@ -224,9 +230,12 @@ export class Ui {
     if (!engine.playback.isPlaying && engine.shown.look !== "picture") void this.#probe.show(engine, at, this.#stage.getBoundingClientRect());
   }
 
-  #click(): void {
+  /** A finger's tap shows the controls and hides them, since nothing else would. */
+  #click(isFinger: boolean): void {
     if (!this.controls.menu.hidden) this.controls.toggleMenu(false);
-    else this.commands.togglePlay();
+    else if (isFinger) {
+      if (!this.#wasIdle) this.#idle.begin();
+    } else this.commands.togglePlay();
   }
 
   #key(event: KeyboardEvent): void {
