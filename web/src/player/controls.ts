@@ -1,6 +1,6 @@
 /** The bar of controls: what it is made of, and how it follows the player. */
 
-import { LOOKS, type Look } from "../synthesis/renderer.ts";
+import { LOOKS, type Look } from "../synthesis/looks.ts";
 import type { Commands } from "./commands.ts";
 import { button, element, icon, options } from "./dom.ts";
 import { EYE_MODES, type Eyes } from "./drawing.ts";

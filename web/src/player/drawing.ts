@@ -3,6 +3,7 @@
 import type { Header } from "../container/header.ts";
 import { clampView, convergence, steps, type Viewpoint } from "../geometry.ts";
 import type { CameraFrame } from "../synthesis/camera_textures.ts";
+import { isDrafted } from "../synthesis/draft.ts";
 import type { ViewRenderer } from "../synthesis/renderer.ts";
 import type { Shown } from "./shown.ts";
 
@@ -49,9 +50,9 @@ export function viewsShown(header: Header, { view, eyes, focus }: Shown): Viewpo
   return eyesOf(header, view, eyes);
 }
 
-/** One view as it is, without any of what shaders add. */
+/** One view, which a draft can show without any help of shaders. */
 export function isPlain({ look, eyes, focus }: Shown): boolean {
-  return look === "picture" && eyes.mode === "one" && focus === undefined;
+  return isDrafted(look) && eyes.mode === "one" && focus === undefined;
 }
 
 /** A share of the picture's size each way, px. */

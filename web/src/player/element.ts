@@ -3,7 +3,8 @@
 import { isLiveAddress } from "../container/live.ts";
 import { BlobSource, HttpSource, type Source } from "../container/sources.ts";
 import type { Viewpoint } from "../geometry.ts";
-import type { Look, Pixels } from "../synthesis/renderer.ts";
+import type { Look } from "../synthesis/looks.ts";
+import type { Pixels } from "../synthesis/renderer.ts";
 import { element } from "./dom.ts";
 import type { Eyes } from "./drawing.ts";
 import type { Engine, EngineEvents } from "./engine.ts";

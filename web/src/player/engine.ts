@@ -2,7 +2,8 @@
 
 import type { Header } from "../container/header.ts";
 import type { Viewpoint } from "../geometry.ts";
-import type { Look, Pixels } from "../synthesis/renderer.ts";
+import type { Look } from "../synthesis/looks.ts";
+import type { Pixels } from "../synthesis/renderer.ts";
 import type { Legend } from "./legend.ts";
 import type { Section } from "./section.ts";
 import type { Shown } from "./shown.ts";

@@ -1,6 +1,6 @@
 /** What the colours of a look mean, and how good a view is beside its original. */
 
-import type { Look } from "../synthesis/renderer.ts";
+import type { Look } from "../synthesis/looks.ts";
 import { drawing, element } from "./dom.ts";
 import { TEXTS } from "./texts.ts";
 

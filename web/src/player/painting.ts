@@ -140,7 +140,7 @@ export class Painting {
     const shown = placed(this.#subject.shown);
     if (!isFinal && isPlain(shown) && !this.isRecorded) {
       const [width, height] = sizeOf(this.#header, detail);
-      this.#draft.show(this.#renderer.draft(this.#frames, shown.view, shown.dolly, width, height), width, height);
+      this.#draft.show(this.#renderer.draft(this.#frames, shown.view, shown, width, height), width, height);
       return;
     }
     this.#draft.hide();

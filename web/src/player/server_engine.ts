@@ -2,7 +2,8 @@
 
 import type { Codec, Header } from "../container/header.ts";
 import { clampView, mostDolly, type Viewpoint } from "../geometry.ts";
-import type { Look, Pixels } from "../synthesis/renderer.ts";
+import type { Look } from "../synthesis/looks.ts";
+import type { Pixels } from "../synthesis/renderer.ts";
 import { element } from "./dom.ts";
 import type { Engine, EngineEvents, Place, Played } from "./engine.ts";
 import type { Legend } from "./legend.ts";

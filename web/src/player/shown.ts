@@ -1,7 +1,7 @@
 /** What is asked of the player to show, and what is told of it. */
 
 import type { Viewpoint } from "../geometry.ts";
-import type { Look } from "../synthesis/renderer.ts";
+import type { Look } from "../synthesis/looks.ts";
 import type { Eyes } from "./drawing.ts";
 
 export interface Shown {

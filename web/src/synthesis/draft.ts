@@ -3,6 +3,9 @@
 import type { Header } from "../container/header.ts";
 import { infinityOf } from "../geometry.ts";
 import type { CameraFrame } from "./camera_textures.ts";
+import { DraftFetch } from "./draft_fetch.ts";
+import { explain } from "./draft_looks.ts";
+import type { Look } from "./looks.ts";
 
 /** Cameras that are asked. */
 const MOST_CAMERAS = 4;
@@ -14,6 +17,19 @@ const RATIO = 1.3;
 /** px, each way, that share a disparity and colour differences: of a whole picture, and of a smaller one. */
 const STEP = 2;
 const SMALLER_STEP = 4;
+
+/** Whether drafts can show a look: all but what an original is needed for. */
+export function isDrafted(look: Look): boolean {
+  return look !== "difference";
+}
+
+/** See `ViewSettings`. */
+export interface DraftSettings {
+  readonly look: Look;
+  readonly dolly: number;
+  readonly offset?: readonly [number, number];
+  readonly wipe?: number;
+}
 
 /** A camera that a draft is made from, as the view sees it: px (x, y) from the view to it for each px of disparity. */
 export interface DraftCamera {
@@ -43,6 +59,9 @@ export class Draft {
   readonly #surface: Float32Array;
   /** Places of the two cameras that show a sample, by their order: i + 4 j. */
   readonly #seen: Uint8Array;
+  /** How many cameras show a sample, and how far apart the two are in brightness (see `Samples`). */
+  readonly #cameras: Uint8Array;
+  readonly #away: Float32Array;
   /** What a sample's colour differences add to red, green and blue. */
   readonly #tint: Int16Array;
   #step = STEP;
@@ -58,15 +77,17 @@ export class Draft {
     this.#found = Array.from({ length: MOST_CAMERAS }, () => new Uint8Array(samples));
     this.#surface = new Float32Array(samples);
     this.#seen = new Uint8Array(samples);
+    this.#cameras = new Uint8Array(samples);
+    this.#away = new Float32Array(samples);
     this.#tint = new Int16Array(3 * samples);
   }
 
   /**
-   * A view from so far ahead (see `ViewSettings.dolly`), of `width` x `height`, moved by `offset` px: RGBA, rows from the top.
+   * A view of `width` x `height`: RGBA, rows from the top.
    *
    * The camera that counts most comes first. What is returned holds until the next call.
    */
-  make(cameras: readonly DraftCamera[], dolly: number, offset: readonly [number, number], width: number, height: number): Uint8Array<ArrayBuffer> {
+  make(cameras: readonly DraftCamera[], { look, dolly, offset = [0, 0], wipe = 0 }: DraftSettings, width: number, height: number): Uint8Array<ArrayBuffer> {
     this.#step = width < this.#header.width ? SMALLER_STEP : STEP;
     this.#across = Math.ceil(this.#header.width / this.#step);
     this.#down = Math.ceil(this.#header.height / this.#step);
@@ -76,6 +97,7 @@ export class Draft {
     this.#fillHoles();
     this.#colour(cameras, dolly);
     this.#paint(cameras, dolly, offset, width, height);
+    if (look !== "picture") this.#explain(look, offset, width, height, Math.round(wipe * width));
     return new Uint8Array(this.#pixels.buffer, 0, 4 * width * height);
   }
 
@@ -124,7 +146,7 @@ export class Draft {
 
   /** Surfaces are tried near to far; a farther one wins where its cameras weigh RATIO times the winner so far. */
   #vote(weights: readonly number[]): void {
-    const [tolerance, surface, seen] = [this.#tolerance, this.#surface, this.#seen];
+    const [tolerance, surface, seen, seers] = [this.#tolerance, this.#surface, this.#seen, this.#cameras];
     const count = weights.length;
     const codes = new Uint8Array(count);
     for (let at = this.#across * this.#down - 1; at >= 0; at--) {
@@ -155,11 +177,14 @@ export class Draft {
       // The two that count most are enough; of what no camera sees, all know as much.
       let one = -1;
       let other = -1;
-      for (let i = 0; i < count && other < 0; i++) {
+      let seeing = 0;
+      for (let i = 0; i < count; i++) {
         if (best >= 0 && (codes[i] === 0 || Math.abs(codes[i] - best) > tolerance)) continue;
+        seeing++;
         if (one < 0) one = i;
-        else other = i;
+        else if (other < 0) other = i;
       }
+      seers[at] = best < 0 ? 0 : seeing;
       seen[at] = one < 0 ? 0 : one + 4 * (other < 0 ? one : other);
     }
   }
@@ -188,7 +213,7 @@ export class Draft {
   #colour(cameras: readonly DraftCamera[], dolly: number): void {
     const { width, height, range } = this.#header;
     const infinity = infinityOf(this.#header);
-    const [step, across, surface, tint] = [this.#step, this.#across, this.#surface, this.#tint];
+    const [step, across, surface, tint, away] = [this.#step, this.#across, this.#surface, this.#tint, this.#away];
     const [columns, rows] = [(width + 1) >> 1, (height + 1) >> 1];
     const toPx = (range[1] - range[0]) / 255;
     const [middleX, middleY] = [(width - 1) / 2, (height - 1) / 2];
@@ -203,6 +228,8 @@ export class Draft {
         let cb = 0;
         let cr = 0;
         let total = 0;
+        let mean = 0;
+        let squares = 0;
         const pair = this.#seen[at];
         for (let k = 0; k < 2; k++) {
           const { frame: { picture }, shift, weight } = cameras[k === 0 ? pair & 3 : pair >> 2];
@@ -211,7 +238,12 @@ export class Draft {
           cb += weight * picture.u[v * columns + u];
           cr += weight * picture.v[v * columns + u];
           total += weight;
+          const luma = picture.y[2 * v * 2 * columns + 2 * u];
+          mean += weight * luma;
+          squares += weight * luma * luma;
         }
+        mean /= total;
+        away[at] = Math.sqrt(Math.max(squares / total - mean * mean, 0));
         cb = (cb / total - 128) * (255 / 224);
         cr = (cr / total - 128) * (255 / 224);
         tint[3 * at] = 1.5748 * cr;
@@ -225,22 +257,22 @@ export class Draft {
   #paint(cameras: readonly DraftCamera[], dolly: number, offset: readonly [number, number], width: number, height: number): void {
     const whole = this.#header;
     const infinity = infinityOf(whole);
-    const [step, surface, seen, tint, pixels] = [this.#step, this.#surface, this.#seen, this.#tint, this.#pixels];
+    const [surface, seen, tint, pixels] = [this.#surface, this.#seen, this.#tint, this.#pixels];
     const toPx = (whole.range[1] - whole.range[0]) / 255;
     const [middleX, middleY] = [(whole.width - 1) / 2, (whole.height - 1) / 2];
     const stride = 2 * ((whole.width + 1) >> 1);
     const isWhole = width === whole.width;
     // A run of pixels of one sample is read from where its first one lies.
     const [lastX, lastY] = [whole.width - (isWhole ? STEP + 0.001 : SMALLER_STEP), whole.height - 1.001];
-    const sampleOf = (at: number, count: number) => Math.min(Math.max(Math.floor((at - this.#first) / step + 0.5), 0), count - 1);
-    const placeOf = (i: number, from: number, to: number, by: number) => ((i + 0.5) * to) / from - 0.5 + by;
-    const placesX = Float32Array.from({ length: width }, (_, i) => placeOf(i, width, whole.width, offset[0]));
-    const samplesX = Uint16Array.from(placesX, (x) => sampleOf(x, this.#across));
-    const one = new Fetch();
-    const other = new Fetch();
+    const placesX = placesOf(width, whole.width, offset[0]);
+    const placesY = placesOf(height, whole.height, offset[1]);
+    const samplesX = this.#samplesOf(placesX, this.#across);
+    const samplesY = this.#samplesOf(placesY, this.#down);
+    const one = new DraftFetch();
+    const other = new DraftFetch();
     for (let j = 0, at = 0; j < height; j++) {
-      const y = placeOf(j, height, whole.height, offset[1]);
-      const row = sampleOf(y, this.#down) * this.#across;
+      const y = placesY[j];
+      const row = samplesY[j] * this.#across;
       for (let i = 0; i < width; ) {
         const begin = i;
         const column = samplesX[i];
@@ -278,34 +310,23 @@ export class Draft {
       }
     }
   }
+
+  /** Which of `count` samples in a row, or a column, are shown at some places. */
+  #samplesOf(places: Float32Array, count: number): Uint16Array {
+    return Uint16Array.from(places, (at) => Math.min(Math.max(Math.floor((at - this.#first) / this.#step + 0.5), 0), count - 1));
+  }
+
+  /** Colours of a look in place of the picture's, from column `fromX` on. */
+  #explain(look: Look, offset: readonly [number, number], width: number, height: number, fromX: number): void {
+    const samplesX = this.#samplesOf(placesOf(width, this.#header.width, offset[0]), this.#across);
+    const samplesY = this.#samplesOf(placesOf(height, this.#header.height, offset[1]), this.#down);
+    const count = this.#across * this.#down;
+    const samples = { count, surface: this.#surface, cameras: this.#cameras, away: this.#away };
+    explain(look, samples, this.#pixels, width, height, fromX, (x, y) => samplesY[y] * this.#across + samplesX[x]);
+  }
 }
 
-/** Where one camera's brightness is read for a run of pixels of one sample, and how much its pixels count, in whole numbers. */
-class Fetch {
-  /** Of its four pixels the upper left one, and what each counts. */
-  place = 0;
-  a = 0;
-  b = 0;
-  c = 0;
-  d = 0;
-  /** The nearest pixel, between pixels of its row; and what it counts where it is alone. */
-  nearest = 0;
-  all = 0;
-
-  /** `u`, `v`: where the first pixel is seen; `gain`: what all four count together. */
-  aim(u: number, v: number, lastX: number, lastY: number, stride: number, gain: number): void {
-    const inX = Math.max(Math.min(u, lastX), 0);
-    const inY = Math.max(Math.min(v, lastY), 0);
-    const left = inX | 0;
-    const top = inY | 0;
-    const across = inX - left;
-    const down = inY - top;
-    this.place = top * stride + left;
-    this.all = gain | 0;
-    this.d = (gain * across * down) | 0;
-    this.c = ((gain * down) | 0) - this.d;
-    this.b = ((gain * across) | 0) - this.d;
-    this.a = this.all - this.b - this.c - this.d;
-    this.nearest = ((inY + 0.5) | 0) * stride + inX + 0.5;
-  }
+/** Where the pixels of a row, or a column, of `count` are in the whole picture's `size`, moved by some px. */
+function placesOf(count: number, size: number, by: number): Float32Array {
+  return Float32Array.from({ length: count }, (_, i) => ((i + 0.5) * size) / count - 0.5 + by);
 }

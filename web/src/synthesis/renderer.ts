@@ -5,22 +5,20 @@ import { contributors, infinityOf, type Viewpoint } from "../geometry.ts";
 import { BLOCK, Bounds } from "./bounds.ts";
 import { CameraTextures, SLOTS, type CameraFrame } from "./camera_textures.ts";
 import copyFragment from "./copy.frag.glsl";
-import { Draft, type DraftCamera } from "./draft.ts";
+import { Draft, isDrafted, type DraftCamera } from "./draft.ts";
 import fullVertex from "./full.vert.glsl";
 import { framebufferOf, programOf, Texture, type Program } from "./gl.ts";
+import { LOOKS, type Look } from "./looks.ts";
 import searchShader from "./search.glsl";
 import viewFragment from "./view.frag.glsl";
 
-/** What a view shows, in the order of `view.frag.glsl`. */
-export const LOOKS = ["picture", "disparity", "layers", "provenance", "disagreement", "difference"] as const;
-export type Look = (typeof LOOKS)[number];
 const RAW = LOOKS.length;
 
 export interface ViewSettings {
   readonly look: Look;
   /** Disparity in 16 bits in place of the look. */
   readonly raw?: boolean;
-  /** Cubic fetch and soft contours; else quick: a draft of the picture, and other looks by linear fetch. */
+  /** Cubic fetch and soft contours; else a draft, or linear fetch where a draft cannot show it. */
   readonly fine: boolean;
   /** How far the view stands ahead of the cameras' plane: 1 / the disparity of what it would touch, px from infinity. */
   readonly dolly: number;
@@ -98,13 +96,13 @@ export class ViewRenderer {
    */
   draw(frames: readonly CameraFrame[], view: Viewpoint, settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
     const cameras = this.#seeing(frames, view, settings.dolly);
-    if (!settings.fine && settings.look === "picture" && !settings.raw) this.#drawDraft(cameras, settings, area, target);
+    if (!settings.fine && isDrafted(settings.look) && !settings.raw) this.#drawDraft(cameras, settings, area, target);
     else this.#drawView(cameras, settings, area, target);
   }
 
   /** A draft of a view, for whoever shows it: RGBA, rows from the top. What is returned holds until the next draft. */
-  draft(frames: readonly CameraFrame[], view: Viewpoint, dolly: number, width: number, height: number): Uint8Array<ArrayBuffer> {
-    return this.#draft.make(this.#seeing(frames, view, dolly), dolly, [0, 0], width, height);
+  draft(frames: readonly CameraFrame[], view: Viewpoint, settings: Omit<ViewSettings, "fine">, width: number, height: number): Uint8Array<ArrayBuffer> {
+    return this.#draft.make(this.#seeing(frames, view, settings.dolly), settings, width, height);
   }
 
   /** Disparity of one pixel of a view, px, and whether any camera sees it. */
@@ -165,7 +163,7 @@ export class ViewRenderer {
 
   #drawDraft(cameras: readonly DraftCamera[], settings: ViewSettings, area: Area, target: WebGLFramebuffer | null): void {
     const [width, height] = [Math.min(area.width, this.#header.width), Math.min(area.height, this.#header.height)];
-    this.#draftTexture.upload(this.#draft.make(cameras, settings.dolly, settings.offset ?? [0, 0], width, height), width, height);
+    this.#draftTexture.upload(this.#draft.make(cameras, settings, width, height), width, height);
     const copy = this.#copy;
     copy.use();
     copy.textures({ uPicture: this.#draftTexture });
