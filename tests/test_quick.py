@@ -12,20 +12,20 @@ from plane_scene import Plane, PlaneScene, grid
 from mvcodec.array import Viewpoint
 from mvcodec.evaluation.metrics import psnr
 from mvcodec.frames import FloatMap, Picture
-from mvcodec.kernels import view_quick
+from mvcodec.kernels import quick_runs, view_planes, view_quick
 from mvcodec.synthesis.layered import Layered
 from mvcodec.synthesis.quick import Quick
 from mvcodec.synthesis.synthesizers import QUICKER, SYNTHESIZERS
 
 Shape = tuple[int, int]
-SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11)]
+SHAPES = [(1, 1), (1, 13), (13, 1), (2, 3), (9, 11), (3, 37), (2, 32)]
 TOLERANCE = 1.5
 
 
 def fetch_twin(picture: Picture, x: float, y: float) -> NDArray[np.float64]:
     """Bilinear at a place rounded to 1 / STEPS px, then rounded to whole grey levels."""
     height, width = picture.shape[:2]
-    x, y = (np.floor(value * view_quick.STEPS + 0.5) / view_quick.STEPS for value in (x, y))
+    x, y = (np.floor(value * quick_runs.STEPS + 0.5) / quick_runs.STEPS for value in (x, y))
     left, top = int(x), int(y)
     right, low = min(left + 1, width - 1), min(top + 1, height - 1)
     above = (left + 1 - x) * picture[top, left] + (x - left) * picture[top, right]
@@ -59,6 +59,11 @@ def blend_twin(
     return out, seen_by
 
 
+def room(count: int, shape: Shape) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+    wider = count, shape[0] + 1, shape[1] + 1
+    return view_planes.reserve(wider, np.dtype(np.uint32)), view_planes.reserve(wider, np.dtype(np.float32))
+
+
 def check_blend(seed: int, shape: Shape, count: int) -> None:
     rng = np.random.default_rng(seed)
     # Multiples of 1/16 px, so that the twin rounds as the loop does.
@@ -68,18 +73,17 @@ def check_blend(seed: int, shape: Shape, count: int) -> None:
     shifts = np.asarray(rng.integers(-1, 2, (count, 2)), np.float32)
     weights = [int(weight) for weight in rng.integers(1, 1 + view_quick.WEIGHTS // count, count)]
     # The cameras of a view are some of all, in any order: here every other one, the last first.
-    packed = np.zeros((2 * count, shape[0] + 1, shape[1] + 1), np.uint64)
-    everyone = np.repeat(maps[1:], 2, axis=0)
+    packed, own = room(2 * count, shape)
     cameras = np.arange(2 * count - 2, -1, -2)
-    for camera, picture in zip(cameras, pictures[::-1], strict=True):
-        view_quick.pack(picture, packed[camera])
+    for camera, picture, disparity in zip(cameras, pictures[::-1], maps[:0:-1], strict=True):
+        view_quick.pack(picture, disparity, packed[camera], own[camera])
     out, seen_by = np.full((*shape, 3), 77, np.uint8), np.full(shape, 99, np.uint8)
     cut = shape[0] // 3
     for first, last in ((cut, shape[0]), (0, cut)):
         view_quick.blend(
             cameras,
             packed,
-            everyone,
+            own,
             shifts[::-1].copy(),
             np.array(weights[::-1], np.uint64),
             maps[0],
@@ -108,14 +112,16 @@ def test_blend_of_every_shape(shape: Shape) -> None:
 
 def test_white_stays_white_at_full_weight() -> None:
     shape = (3, 4)
-    packed = np.empty((4, 4, 5), np.uint64)
-    for camera in packed:
-        view_quick.pack(np.full((*shape, 3), 255, np.uint8), camera)
+    packed, own = room(4, shape)
+    for camera in range(4):
+        view_quick.pack(
+            np.full((*shape, 3), 255, np.uint8), np.zeros(shape, np.float32), packed[camera], own[camera]
+        )
     out, seen_by = np.empty((*shape, 3), np.uint8), np.empty(shape, np.uint8)
-    maps, view = np.zeros((4, *shape), np.float32), np.zeros(shape, np.float32)
+    view = np.zeros(shape, np.float32)
     weights = np.full(4, view_quick.WEIGHTS // 4, np.uint64)
     shifts = np.zeros((4, 2), np.float32)
-    view_quick.blend(np.arange(4), packed, maps, shifts, weights, view, 1.0, out, seen_by, 0, 3)
+    view_quick.blend(np.arange(4), packed, own, shifts, weights, view, 1.0, out, seen_by, 0, 3)
     assert (out == 255).all()
     assert (seen_by == 4).all()
 

@@ -90,6 +90,14 @@ class Lanes:
         convert = self.builder.fptosi if self._floats else self.builder.sext
         return Lanes(self.builder, convert(self.value, kind))
 
+    def to_bytes(self) -> Lanes:
+        """Float32 of 0..255 as bytes, rounded down."""
+        return Lanes(self.builder, self.builder.trunc(self.to_words().value, ir.VectorType(BYTE, COUNT)))
+
+    def widened(self) -> Lanes:
+        """Bytes without a sign as numbers of 16 bits."""
+        return Lanes(self.builder, self.builder.zext(self.value, ir.VectorType(SHORT, self.value.type.count)))
+
     def bits(self) -> Any:
         """Lanes of one bit as an unsigned number, the first lane lowest: its value in the code."""
         return self.builder.bitcast(self.value, ir.IntType(self.value.type.count))

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvcodec.kernels.lanes import COUNT
-from mvcodec.kernels.view_fetch import BORDER, CONTOUR, corner_of, phase_of, place_of
+from mvcodec.kernels.view_fetch import BORDER, CONTOUR, corner_of, distinct, phase_of, place_of
 from mvcodec.kernels.view_runs import PLACES, add_run, first_of, marked, place_columns, place_rows, store_run
 from mvcodec.kernels.view_vectors import ONE, add_edge, add_fetched
 
@@ -151,21 +151,6 @@ def _list(bits, x, chosen, count):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _distinct(shifts):  # type: ignore[no-untyped-def]
-    """The different ones among shifts, and which of them each is: cameras of one row or column share them."""
-    found, which = np.empty_like(shifts), np.empty(shifts.size, np.int64)
-    count = 0
-    for i in range(shifts.size):
-        which[i] = 0
-        while which[i] < count and found[which[i]] != shifts[i]:
-            which[i] += 1
-        if which[i] == count:
-            found[count] = shifts[i]
-            count += 1
-    return found[:count], which
-
-
-@njit(cache=True, nogil=True)
 def _mark_contours(y, view_disparity, tolerance, high, low, marks):  # type: ignore[no-untyped-def]
     """Mark the pixels of a row whose 3 x 3 window holds more than one surface."""
     height, width = view_disparity.shape
@@ -226,8 +211,8 @@ def blend(
     near_px, trust = np.float32(tolerance), np.float32(edge_trust)
     seeing = cameras, flat, shifts, weights, trust, fetching
     whole_sharpness = np.int32(round(sharpness * ONE))
-    columns_apart, column_of = _distinct(shifts[:, 0])
-    rows_apart, row_of = _distinct(shifts[:, 1])
+    columns_apart, column_of = distinct(shifts[:, 0])
+    rows_apart, row_of = distinct(shifts[:, 1])
     columns = np.empty(PLACES * columns_apart.size, np.int32)
     rows = np.empty(PLACES * rows_apart.size, np.int32)
     high, low = np.empty(width + 2, np.float32), np.empty(width + 2, np.float32)

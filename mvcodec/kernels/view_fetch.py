@@ -47,3 +47,18 @@ def corner_of(at_x, at_y, width, height):  # type: ignore[no-untyped-def]
     right = np.uintp(1) if left + 1 < width else np.uintp(0)
     down = np.uintp(width) if top + 1 < height else np.uintp(0)
     return np.uintp(top * np.int32(width) + left), (right, down)
+
+
+@njit(cache=True, nogil=True)
+def distinct(shifts):  # type: ignore[no-untyped-def]
+    """The different ones among shifts, and which of them each is: cameras of one row or column share them."""
+    found, which = np.empty_like(shifts), np.empty(shifts.size, np.int64)
+    count = 0
+    for i in range(shifts.size):
+        which[i] = 0
+        while which[i] < count and found[which[i]] != shifts[i]:
+            which[i] += 1
+        if which[i] == count:
+            found[count] = shifts[i]
+            count += 1
+    return found[:count], which

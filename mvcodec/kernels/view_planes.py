@@ -27,14 +27,15 @@ def make_room(count: int, height: int, width: int) -> Planes:
     """
     padded = count, height + 2 * BORDER, width + 2 * BORDER
     return (
-        _reserve((*padded, 2), np.dtype(np.int16)),
-        _reserve((*padded, 2), np.dtype(np.int16)),
+        reserve((*padded, 2), np.dtype(np.int16)),
+        reserve((*padded, 2), np.dtype(np.int16)),
         np.empty((count, height, width), np.float32),
-        _reserve(padded, np.dtype(np.float32)),
+        reserve(padded, np.dtype(np.float32)),
     )
 
 
-def _reserve(shape: tuple[int, ...], kind: np.dtype[Any]) -> NDArray[Any]:
+def reserve(shape: tuple[int, ...], kind: np.dtype[Any]) -> NDArray[Any]:
+    """An array, not yet filled, before and behind which is memory that runs of pixels may read."""
     slack, size = 2 * COUNT, math.prod(shape)
     return np.empty(size + 2 * slack, kind)[slack : slack + size].reshape(shape)
 

@@ -7,6 +7,7 @@ loads of neighbours only; what is left makes another round.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
@@ -53,8 +54,13 @@ NOWHERE = -(1 << 30)
 """Stands for a place outside of the camera's picture; two of them make a number still."""
 
 
-def _places(downwards: bool) -> Any:
-    """The intrinsic that finds where pixels of a row are seen along one axis, and what is fetched there."""
+def places(downwards: bool, split: Callable[[Lanes, Any], tuple[Lanes, ...]]) -> Any:
+    """The intrinsic that finds where pixels of a row are seen along one axis, and what is fetched there.
+
+    Args:
+        downwards: along columns of the camera; else along its rows.
+        split: the whole pixel of each place, and numbers that say where beyond it, all of them to be stored.
+    """
 
     def place(_typing, disparity, out, at, x, y, length, shift, step, sharpness):  # type: ignore[no-untyped-def]
         """Where a camera sees sixteen pixels of a view's row, along one axis.
@@ -79,18 +85,22 @@ def _places(downwards: bool) -> Any:
             place = first + constant(builder, FLOAT, lanes) + filled(builder, shift) * d
             end = filled(builder, builder.sitofp(length, FLOAT))
             inside = place.is_(">", -0.5) & place.is_("<", end - 0.5)
-            place = place.within(0.0, end - 1.0)
-            whole = place.to_words()
-            part = ((place - whole.to_floats()) * float(STEPS) + 0.5).to_words()
+            whole, *parts = split(place.within(0.0, end - 1.0), sharpness)
             moved = whole * filled(builder, step) - constant(builder, WORD, lanes)
-            found = moved.where(inside, NOWHERE), *_cubic(part, filled(builder, sharpness)), _linear(part)
-            for number, vector in enumerate(found):
+            for number, vector in enumerate((moved.where(inside, NOWHERE), *parts)):
                 store(vector, out, builder.add(at, ir.Constant(at.type, COUNT * number)))
             return context.get_dummy_value()
 
         return types.void(*arguments), generate
 
     return intrinsic(place)
+
+
+def _split(place: Lanes, sharpness: Any) -> tuple[Lanes, ...]:
+    """A place's pixel, and weights of the pixels around it: cubic, in two pairs, and linear."""
+    whole = place.to_words()
+    part = ((place - whole.to_floats()) * float(STEPS) + 0.5).to_words()
+    return whole, *_cubic(part, filled(place.builder, sharpness)), _linear(part)
 
 
 def fetch_early(builder: Any, array: Any, index: Any, element: Any) -> None:
@@ -210,11 +220,11 @@ def _add_run(  # type: ignore[no-untyped-def]
         start, stride, x, column, row, weight, tolerance = values[8:]
         index = start.type
 
-        def places(array, first, number):  # type: ignore[no-untyped-def]
+        def of_place(array, first, number):  # type: ignore[no-untyped-def]
             return loaded(builder, array, builder.add(first, ir.Constant(index, COUNT * number)), WORD)
 
         d = loaded(builder, disparity, x, FLOAT)
-        across, down = places(columns, column, 0), places(rows, row, 0)
+        across, down = of_place(columns, column, 0), of_place(rows, row, 0)
         inside = across.is_(">", NOWHERE) & down.is_(">", NOWHERE)
         tolerance, weight = filled(builder, tolerance), filled(builder, weight)
         edges = cgutils.alloca_once_value(builder, ir.Constant(ir.IntType(COUNT), 0))
@@ -233,10 +243,12 @@ def _add_run(  # type: ignore[no-untyped-def]
                 builder.icmp_unsigned("!=", clear.bits(), ir.Constant(ir.IntType(COUNT), 0))
             ):
                 # Loaded here, since LLVM would widen them before the loop and narrow them in it again.
-                across, along = ([places(array, first, number) for number in (1, 2)] for array, first in both)
+                across, along = (
+                    [of_place(array, first, number) for number in (1, 2)] for array, first in both
+                )
                 grey = _luma(builder, pairs, place, stride, across, along)
                 red, blue = _differences(
-                    builder, colour, place, stride, *(places(array, first, 3) for array, first in both)
+                    builder, colour, place, stride, *(of_place(array, first, 3) for array, first in both)
                 )
                 unit = weight * (1.0 / (LEVELS * ONE))
                 for number, plane in enumerate((grey, red, blue, None)):
@@ -303,10 +315,8 @@ def _store_run(_typing, sums, first, pixels, place):  # type: ignore[no-untyped-
         scale = one / weight.where(weight.is_(">", 0.0), 1.0)
         grey, red, blue = grey * scale, red * scale, blue * scale
         green = grey + red * (-0.299 / 0.587) + blue * (-0.114 / 0.587)
-        kind = ir.VectorType(BYTE, COUNT)
         channels = [
-            Lanes(builder, builder.trunc((channel + 0.5).within(0.0, 255.0).to_words().value, kind))
-            for channel in (grey + red, green, grey + blue)
+            (channel + 0.5).within(0.0, 255.0).to_bytes() for channel in (grey + red, green, grey + blue)
         ]
         store_channels(channels, pixels, values[3])
         return context.get_dummy_value()
@@ -344,8 +354,8 @@ def _first_of(_typing, bits):  # type: ignore[no-untyped-def]
     return types.intp(bits), generate
 
 
-place_columns: Any = _places(downwards=False)
-place_rows: Any = _places(downwards=True)
+place_columns: Any = places(downwards=False, split=_split)
+place_rows: Any = places(downwards=True, split=_split)
 add_run: Any = intrinsic(_add_run)
 store_run: Any = intrinsic(_store_run)
 marked: Any = intrinsic(_marked)

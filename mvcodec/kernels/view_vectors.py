@@ -280,15 +280,6 @@ def _add_edge(  # type: ignore[no-untyped-def]
     return types.uint8(*arguments), generate
 
 
-def store_bytes(builder, numbers, pointer, index):  # type: ignore[no-untyped-def]
-    """Store the first three of four numbers of 0..255 as bytes, rounded down."""
-    whole = builder.fptosi(numbers, ir.VectorType(ir.IntType(32), 4))
-    bytes_ = builder.trunc(whole, ir.VectorType(ir.IntType(8), 4))
-    for lane in range(3):
-        byte = builder.extract_element(bytes_, ir.Constant(ir.IntType(32), lane))
-        builder.store(byte, builder.gep(pointer, [builder.add(index, ir.Constant(index.type, lane))]))
-
-
 add_fetched: Any = intrinsic(_add_fetched)
 add_edge: Any = intrinsic(_add_edge)
 fetch_luma: Any = intrinsic(_fetch_luma)

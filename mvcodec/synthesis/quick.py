@@ -40,7 +40,8 @@ class Quick:
         self._lock = threading.Lock()
         self._decoded: DecodedSet | None = None
         self._ready: set[Position] = set()
-        self._packed = np.empty((0, 0, 0), np.uint64)
+        self._packed = np.empty((0, 0, 0), np.uint32)
+        self._own = np.empty((0, 0, 0), np.float32)
         self._maps = np.empty((0, 0, 0), np.float32)
 
     def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
@@ -70,7 +71,7 @@ class Quick:
             kernel("view_quick.blend"),
             cameras.places,
             self._packed,
-            self._maps,
+            self._own,
             cameras.shifts,
             _whole(cameras.weights, WEIGHTS),
             disparity,
@@ -97,8 +98,8 @@ class Quick:
         ]
 
         def ready(camera: Position, place: int) -> None:
-            pack(decoded.pictures[camera], self._packed[place])
             self._maps[place] = decoded.disparities[camera].values_px
+            pack(decoded.pictures[camera], self._maps[place], self._packed[place], self._own[place])
 
         if missing:
             run_all(ready, *zip(*missing, strict=True))
@@ -106,11 +107,17 @@ class Quick:
         return cameras
 
     def _make_room(self, decoded: DecodedSet) -> None:
+        from mvcodec.kernels.view_planes import reserve
+
         array = decoded.array
         count = len(array.real)
         if self._maps.shape != (count, array.height, array.width):
             self._maps = np.empty((count, array.height, array.width), np.float32)
-            self._packed = np.empty((count, array.height + 1, array.width + 1), np.uint64)
+            wider = count, array.height + 1, array.width + 1
+            self._packed, self._own = (
+                reserve(wider, np.dtype(np.uint32)),
+                reserve(wider, np.dtype(np.float32)),
+            )
 
 
 def _whole(weights: NDArray[np.float32], most: int) -> NDArray[np.uint64]:
