@@ -14,6 +14,7 @@ from web_fixtures import Site, serve_folder
 import mvcodec
 
 SAMPLE = Path(__file__).parents[1] / "samples" / "room_2x2.mcap"
+OTHER = Path(__file__).parent / "conformance" / "odd_size.mcap"
 pytest_plugins = ("web_fixtures",)
 in_browser = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 
@@ -74,6 +75,14 @@ def test_the_site_plays_from_a_plain_web_server(tab: Page, tmp_path: Path) -> No
     for site in serve_folder(tmp_path):
         tab.goto(f"{site.url}/index.html")
         shows_a_picture(tab)
+        site.put("other.mcap", OTHER.read_bytes())
+        tab.goto(f"{site.url}/index.html?src=other.mcap&view=0,1&t=0.1")
+        shows_a_picture(tab)
+        assert tab.evaluate("document.querySelector('mvcodec-player').shown.view") == {"row": 0, "col": 1}
+        size = tab.evaluate(
+            "(({ width, height }) => [width, height])(document.querySelector('mvcodec-player').pixels())"
+        )
+        assert size != [64, 48]
 
 
 @in_browser

@@ -7,9 +7,9 @@ import http.client
 
 import numpy as np
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM, pixels_of, screenshot, settled, shown, waits_for
+from browser_page import CHROMIUM, NO_CHROMIUM, PLAYER, pixels_of, screenshot, settled, shown, waits_for
 from player_files import Running, decode_picture
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 from web_fixtures import SAMPLE, Site, open_player
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
@@ -54,6 +54,50 @@ def test_keys_step_look_and_change_what_is_shown(sample_page: Page) -> None:
     expect(sample_page.locator(".stats")).to_contain_text("h264")
     sample_page.keyboard.press("?")
     expect(sample_page.get_by_role("dialog")).to_contain_text("look around")
+
+
+def test_keys_skip_and_change_the_speed(sample_page: Page) -> None:
+    for key, frame in (("l", 3), ("j", 2), ("Home", 0)):
+        sample_page.keyboard.press(key)
+        waits_for(sample_page, f"shown.frame === {frame}")  # a tenth of a short file is a frame of this one
+    for key, times, speed in (("+", 3, 4), ("-", 9, 0.1)):
+        for _ in range(times):
+            sample_page.keyboard.press(key)
+        assert shown(sample_page)["speed"] == speed
+        expect(sample_page.get_by_label("Speed")).to_have_value(str(speed))
+
+
+def test_a_key_fills_the_screen_and_a_double_click_leaves_it(sample_page: Page) -> None:
+    sample_page.keyboard.press("f")
+    sample_page.wait_for_function("() => document.fullscreenElement !== null")
+    sample_page.mouse.dblclick(480, 250)
+    sample_page.wait_for_function("() => document.fullscreenElement === null")
+    assert not shown(sample_page)["isPlaying"], "neither of both clicks was one by itself"
+
+
+def test_it_says_what_it_waits_for(tab: Page, sample_server: Running) -> None:
+    def hold(_route: Route) -> None:
+        pass
+
+    tab.route("**/video.mcap", hold)
+    tab.goto(f"{sample_server.url}?view=1,1")
+    expect(tab.locator(".wait")).to_have_text("Opening the file")
+    expect(tab.locator(".wait")).to_be_visible()
+    expect(tab.locator(".controls").get_by_label("Play")).to_be_disabled()
+    tab.unroute("**/video.mcap")  # what was held goes on
+    tab.evaluate(f"{PLAYER}.ready")
+    expect(tab.locator(".wait")).to_be_hidden()
+    expect(tab.locator(".controls").get_by_label("Play")).to_be_enabled()
+
+
+def test_it_has_the_colours_of_the_system(sample_page: Page) -> None:
+    def ground() -> str:
+        found: str = sample_page.evaluate(f"getComputedStyle({PLAYER}).backgroundColor")
+        return found
+
+    light = ground()
+    sample_page.emulate_media(color_scheme="dark")
+    assert ground() != light
 
 
 def test_space_plays_and_the_time_runs_and_loops(sample_page: Page) -> None:

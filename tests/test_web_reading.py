@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser_page import CHROMIUM, NO_CHROMIUM
+from browser_page import CHROMIUM, NO_CHROMIUM, watched_page
 from coding import encoded_file, make_array
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from player_files import damage
-from playwright.sync_api import Page
+from playwright.sync_api import Browser, Page
 from web_fixtures import Site, open_player
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
@@ -127,6 +127,35 @@ def test_a_growing_file_is_followed(tab: Page, site: Site) -> None:
         await document.querySelector("mvcodec-player").seek(1e9);
         return Math.max(...window.frames) > window.lastBefore;
     }""")
+
+
+def test_a_decoder_that_falls_silent_is_replaced_by_software(chromium: Browser, site: Site) -> None:
+    """As hardware does whose sessions have run out."""
+    for page in watched_page(chromium, 640, 480):
+        page.add_init_script("""
+            const wait = window.setTimeout;
+            const shorter = { 4000: 20, 50: 1 }; // to spare our patience
+            window.setTimeout = (done, ms) => wait(done, shorter[ms] ?? ms);
+            const { configure, decode, flush } = VideoDecoder.prototype;
+            window.silent = 0;
+            VideoDecoder.prototype.configure = function (config) {
+                this.isSoftware = config.hardwareAcceleration === "prefer-software";
+                return configure.call(this, config);
+            };
+            VideoDecoder.prototype.decode = function (chunk) {
+                if (this.isSoftware) return decode.call(this, chunk);
+                window.silent++;
+            };
+            VideoDecoder.prototype.flush = function () {
+                return this.isSoftware ? flush.call(this) : new Promise(() => {});
+            };
+        """)
+        site.put("square.mcap", SAMPLE.read_bytes())
+        open_player(page, site, "square.mcap", 'view="1,1"')
+        assert page.evaluate("window.silent") > 0
+        page.evaluate("document.querySelector('mvcodec-player').seek(5)")
+        assert page.evaluate("document.querySelector('mvcodec-player').shown.frame") == 5
+        assert page.evaluate("window.troubles") == []
 
 
 def test_damage_is_skipped_to_the_next_keyframe_and_told(tab: Page, site: Site, tmp_path: Path) -> None:

@@ -32,6 +32,8 @@ export class TrackDecoder {
   #software = false;
   #failure: Error | undefined;
   #next = -1;
+  /** What is waited for has been put in, and nothing has been heard of the decoder since. */
+  #isFed = false;
   readonly #outputs = new Set<number>();
   #wake: () => void = () => {};
   readonly #order: PictureOrder;
@@ -55,7 +57,7 @@ export class TrackDecoder {
    */
   async decode(units: readonly Unit[], frame: number): Promise<boolean> {
     if (await this.#attempt(units, frame)) return true;
-    const isSilent = this.#next > frame && this.#failure === undefined;
+    const isSilent = this.#isFed && this.#failure === undefined;
     if (!isSilent || this.#software) return false;
     this.#software = true; // once more without hardware, from the keyframe on when it comes again
     this.reset();
@@ -77,6 +79,7 @@ export class TrackDecoder {
 
   async #attempt(units: readonly Unit[], frame: number): Promise<boolean> {
     this.#failure = undefined;
+    this.#isFed = false;
     for (const unit of units) {
       if (unit.isKey && unit.data !== undefined && this.#next !== unit.frame) await this.#start(unit.data);
       const isWhole = this.#follows(unit);
@@ -88,6 +91,7 @@ export class TrackDecoder {
       this.#decoder.decode(
         new EncodedVideoChunk({ type: unit.isKey ? "key" : "delta", timestamp: unit.frame, data: unit.data! }),
       );
+      this.#isFed ||= unit.frame === frame;
       this.#next = unit.frame + 1;
     }
     return this.#next > frame && (await this.#output(frame));
@@ -154,8 +158,11 @@ export class TrackDecoder {
       await this.#news(50);
       // Some decoders hold pictures back until they are told that no more come.
       if (waited === 200 && !isThere() && this.#decoder?.state === "configured" && this.#decoder.decodeQueueSize === 0) {
-        await this.#decoder.flush().catch(() => {});
+        const answer = this.#decoder.flush().then(() => true, () => true);
         this.#next = -1;
+        // One that has given up never answers; one that does will not do better in software.
+        if (!(await Promise.race([answer, silence()]))) break;
+        this.#isFed = false;
       }
     }
     if (this.#failure !== undefined) this.reset();
@@ -171,4 +178,8 @@ export class TrackDecoder {
       };
     });
   }
+}
+
+function silence(): Promise<false> {
+  return new Promise((resolve) => setTimeout(() => resolve(false), SILENT_MS));
 }
