@@ -1,11 +1,11 @@
-"""The sample scenes: `room`, rendered with exact disparity, and `motorcycle`, a real stereo pair."""
+"""The sample scenes: `room`, rendered, `motorcycle`, a real pair, and still ones that are hard to match."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Protocol
 
 import numpy as np
@@ -13,6 +13,8 @@ import numpy as np
 from mvcodec.array import MAX_GRID_SIDE, MAX_PICTURE_SIDE, Calibration, CameraArray, Position, Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.frames import FloatMap, Picture
+from mvcodec.scenes.difficult import ARRANGEMENTS, DifficultScene
+from mvcodec.scenes.difficult import SIZE as DIFFICULT_SIZE
 from mvcodec.scenes.lighting import LightBaker
 from mvcodec.scenes.renderer import LitScene, Matrix, Optics
 from mvcodec.scenes.room import FLOOR_FROM_M, FLOOR_M, LIGHTING, NEAREST_M, WALL_M, Room
@@ -46,7 +48,7 @@ class SceneSettings:
         expected=f"RxC, each 1..{MAX_GRID_SIDE}",
     )
     frames: int | None = setting(
-        None, f"how many (default: {_ROOM_FRAMES}, of a pair 1)", low=1, high=MAX_FRAMES
+        None, f"how many (default: {_ROOM_FRAMES}, where nothing moves 1)", low=1, high=MAX_FRAMES
     )
     size: tuple[int, int] | None = setting(
         None,
@@ -237,9 +239,21 @@ class MotorcycleScene:
         return self._pictures[position], self._disparity if position == (0, 0) else None
 
 
+def _still(name: str, settings: SceneSettings) -> Scene:
+    """A difficult scene.
+
+    Raises:
+        SettingError: more than one frame, as nothing moves.
+    """
+    if settings.frames not in (None, 1):
+        raise SettingError("frames", settings.frames, f"1: nothing moves in the scene {name}")
+    return DifficultScene(name, settings.grid, settings.size or DIFFICULT_SIZE, settings.seed)
+
+
 SCENES: dict[str, Callable[[SceneSettings], Scene]] = {
     "room": RoomScene,
     "motorcycle": MotorcycleScene,
+    **{name: partial(_still, name) for name in ARRANGEMENTS},
 }
 DEFAULT_SCENE = "room"
 

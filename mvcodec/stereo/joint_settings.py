@@ -99,7 +99,7 @@ class JointSettings:
         chance of a match by accident, which must not outvote the blind partner that sees the pixel.
         """
         levels = range_px[1] - range_px[0] + 1
-        return round(self.blind_cost * min(1.0, FEW_LEVELS / levels))
+        return round(self.blind_cost * min(1.0, FEW_LEVELS / levels) ** 2)
 
     @property
     def matching_penalties(self) -> Penalties:

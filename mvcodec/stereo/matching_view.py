@@ -69,7 +69,8 @@ def blindness(grey: NDArray[np.uint8], radii: tuple[int, int], cost: int) -> NDA
         cost: where there is no detail in the one direction at all, while there is in the other.
 
     Returns:
-        uint8 (2, H, W): up to `cost`, the weaker slopes are along the one direction than along the other.
+        uint8 (2, H, W): up to `cost`, the less slopes square up to along the one direction than along the
+        other.
     """
     window = 2 * radii[0] + 1, 2 * radii[1] + 1
     framed = cv2.copyMakeBorder(grey, 1, 1, 1, 1, cv2.BORDER_REFLECT_101)
@@ -78,7 +79,7 @@ def blindness(grey: NDArray[np.uint8], radii: tuple[int, int], cost: int) -> NDA
     squares = [cv2.sqrBoxFilter(slope, cv2.CV_32F, window) + np.float32(NOISE_LEVELS**2) for slope in slopes]
     found = np.empty((2, *grey.shape), np.uint8)
     for own, other, out in zip(squares, squares[::-1], found, strict=True):
-        cv2.convertScaleAbs(np.maximum(1 - cv2.sqrt(cv2.divide(own, other)), 0), out, cost)
+        cv2.convertScaleAbs(np.maximum(1 - cv2.divide(own, other), 0), out, cost)
     return found
 
 
