@@ -34,9 +34,12 @@ def test_the_kernels_share_one_value_for_the_unknown() -> None:
 
 
 def moved(disparity: FloatMap, shift: tuple[float, float], reach: float) -> FloatMap:
-    out = np.full((disparity.shape[0] + 2, disparity.shape[1] + 2), np.nan, np.float32)
+    margin = view_depth.MARGIN
+    out = np.full((disparity.shape[0] + 2, disparity.shape[1] + 2 * margin), np.nan, np.float32)
     view_depth.splat(disparity, *shift, reach, out)
-    return out
+    beside = out[:, : margin - 1], out[:, 1 - margin :]
+    assert all((columns == view_depth.UNKNOWN).all() for columns in beside)
+    return out[:, margin - 1 : 1 - margin]
 
 
 @settings(max_examples=60, deadline=None)

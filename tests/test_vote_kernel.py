@@ -20,9 +20,10 @@ LIMITS = twins.Limits(tolerance=1.5, contrast=10, ratio=1.3, denial=0.6)
 
 def voted(maps: NDArray[np.float32], ballot: twins.Ballot, limits: twins.Limits) -> FloatMap:
     out = np.full((maps.shape[1] - 2, maps.shape[2] - 2), np.nan, np.float32)
-    cameras = np.arange(len(maps))
+    cameras, margin = np.arange(len(maps)), view_depth.MARGIN - 1
+    padded = np.pad(maps, ((0, 0), (0, 0), (margin, margin)), constant_values=77)
     who = cameras, ballot.maps, in_pairs(ballot.lumas), ballot.shifts, ballot.weights
-    in_bands(out.shape[0], out, lambda *band: view_depth.vote(maps, *who, *limits, out, *band))
+    in_bands(out.shape[0], out, lambda *band: view_depth.vote(padded, *who, *limits, out, *band))
     return out
 
 

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from llvmlite import ir
+from numba import types  # noqa: F401  # Numba as a whole first: half of it fails while another thread imports it
+from numba.core import cgutils
 
 COUNT = 16
 
@@ -67,13 +69,22 @@ class Lanes:
         return self._made("ashr", other)
 
     def is_(self, sign: str, other: Any) -> Lanes:
-        """Where "<", "<=", "==", ">=" or ">" holds; nowhere for what is not a number."""
+        """Where "<", "<=", "==", "!=", ">=" or ">" holds; nowhere for what is not a number."""
         compare = self.builder.fcmp_ordered if self._floats else self.builder.icmp_signed
         return Lanes(self.builder, compare(sign, self.value, self.vector(other)))
 
     def where(self, condition: Lanes, other: Any = 0) -> Lanes:
         """These where the condition holds, else the other."""
         return Lanes(self.builder, self.builder.select(condition.value, self.value, self.vector(other)))
+
+    def most(self, other: Lanes) -> Lanes:
+        """The greater of each two float32, all of which are numbers."""
+        kind = self.value.type
+        function = cgutils.get_or_insert_function(
+            self.builder.module, ir.FunctionType(kind, [kind, kind]), f"llvm.maxnum.v{kind.count}f32"
+        )
+        called = self.builder.call(function, [self.value, other.value], fastmath=("nnan", "nsz"))
+        return Lanes(self.builder, called)
 
     def within(self, low: Any, high: Any) -> Lanes:
         """Kept within low..high; what is not a number becomes low."""

@@ -1,4 +1,4 @@
-"""Runs as in `view_runs`, for the quick synthesizer: linear, whole numbers, the nearest pixel asked."""
+"""What the quick synthesizer sees of a run of pixels: linear, in whole numbers; see `runs`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mvcodec.kernels.lanes import (
     shuffled,
     store,
 )
-from mvcodec.kernels.view_runs import NOWHERE, fetch_early, places, pointers, rounds, store_channels
+from mvcodec.kernels.runs import NOWHERE, fetch_early, places, pointers, rounds, store_channels
 
 BITS = 4
 STEPS = 1 << BITS

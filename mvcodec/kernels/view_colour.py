@@ -14,8 +14,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvcodec.kernels.lanes import COUNT
+from mvcodec.kernels.runs import PLACES, marked
 from mvcodec.kernels.view_fetch import BORDER, CONTOUR, corner_of, distinct, phase_of, place_of
-from mvcodec.kernels.view_runs import PLACES, add_run, first_of, marked, place_columns, place_rows, store_run
+from mvcodec.kernels.view_marks import list_bits
+from mvcodec.kernels.view_runs import add_run, place_columns, place_rows, store_run
 from mvcodec.kernels.view_vectors import ONE, add_edge, add_fetched
 
 FloatMap = NDArray[np.float32]
@@ -140,16 +142,6 @@ def _add_edges(  # type: ignore[no-untyped-def]
         )
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _list(bits, x, chosen, count):  # type: ignore[no-untyped-def]
-    """Append the pixels that the bits say from x on to a list; how long it is then."""
-    while bits:
-        chosen[count] = x + first_of(bits)
-        count += 1
-        bits &= bits - np.uint32(1)
-    return count
-
-
 @njit(cache=True, nogil=True)
 def _mark_contours(y, view_disparity, tolerance, high, low, marks):  # type: ignore[no-untyped-def]
     """Mark the pixels of a row whose 3 x 3 window holds more than one surface."""
@@ -231,7 +223,7 @@ def blend(
         contour_count = touched_count = 0
         for x in range(0, width, COUNT):
             bits = marked(marks, x)
-            contour_count = _list(bits, x, contours, contour_count)
+            contour_count = list_bits(bits, x, contours, contour_count)
             for i in range(columns_apart.size):
                 place_columns(
                     disparity,
@@ -274,9 +266,9 @@ def blend(
                     weights[i],
                     near_px,
                 )
-                edge_counts[i] = _list(found, x, edges[i], edge_counts[i])
+                edge_counts[i] = list_bits(found, x, edges[i], edge_counts[i])
                 bits |= found
-            touched_count = _list(bits, x, touched, touched_count)
+            touched_count = list_bits(bits, x, touched, touched_count)
         for x in touched[:touched_count]:
             at = x // COUNT * 4 * COUNT + x % COUNT
             for value in range(4):

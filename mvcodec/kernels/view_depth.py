@@ -10,14 +10,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvcodec.kernels import depth_runs
+from mvcodec.kernels.depth_runs import move_run, vote_run
+from mvcodec.kernels.lanes import COUNT
 from mvcodec.kernels.view_fetch import BORDER
-from mvcodec.kernels.view_marks import list_marked
+from mvcodec.kernels.view_marks import list_bits, list_marked
 from mvcodec.kernels.view_vectors import LEVELS
 
 FloatMap = NDArray[np.float32]
 
-UNKNOWN = np.float32(-1e9)
-"""Stands for a disparity that no camera knows; below any real one."""
+UNKNOWN = np.float32(depth_runs.UNKNOWN)
+
+MARGIN = COUNT
+"""Columns beside a moved map, which runs of pixels may read and write."""
 
 FEWEST_ALIKE = 2
 """Pixels of a line have as many neighbours on it."""
@@ -32,48 +37,20 @@ def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out
         shift_x, shift_y: px that a pixel moves (left, up) for each px of disparity.
         reach: a pixel covers the places within this distance (px, 0.5..1); above 0.5 it closes the
             cracks of surfaces that the move stretches.
-        out: float32 (H + 2, W + 2), C-contiguous, overwritten: the view with a border of one pixel, in
-            which whatever leaves the picture lands; UNKNOWN where nothing does.
+        out: float32 (H + 2, W + 2 MARGIN), C-contiguous, overwritten: the view with a border of one row and
+            MARGIN columns, of which the inner one is where whatever leaves the picture lands; UNKNOWN where
+            nothing does.
     """
     height, width = disparity.shape
     by_x, by_y, spill = np.float32(shift_x), np.float32(shift_y), np.float32(1) - np.float32(reach)
-    stride = np.int32(width + 2)
-    straight = by_x == 0 or by_y == 0
     flat = out.ravel()
     flat[:] = UNKNOWN
-    places = np.empty(width, np.int32)
-    beside, above = np.empty(width, np.int32), np.empty(width, np.int32)
-    chosen = np.empty(width, np.int32)
+    row = np.full(width + COUNT, np.nan, np.float32)
+    size = np.int32(width), np.int32(height)
     for y in range(height):
-        row = disparity[y]
-        for x in range(width):  # vectorised: no branch, 32 bits throughout
-            target_x = min(max(np.float32(x) - by_x * row[x], np.float32(-1)), np.float32(width))
-            target_y = min(max(np.float32(y) - by_y * row[x], np.float32(-1)), np.float32(height))
-            u, v = np.int32(target_x + np.float32(1.5)), np.int32(target_y + np.float32(1.5))
-            part_x = target_x + np.float32(1) - np.float32(u)
-            part_y = target_y + np.float32(1) - np.float32(v)
-            places[x] = v * stride + u
-            beside[x] = np.int32(part_x >= spill) - np.int32(part_x <= -spill)
-            above[x] = (np.int32(part_y >= spill) - np.int32(part_y <= -spill)) * stride
-        if straight:
-            for x in range(width):
-                d, place = row[x], np.uint32(places[x])
-                other = np.uint32(places[x] + (beside[x] | above[x]))
-                flat[place] = max(flat[place], d)
-                flat[other] = max(flat[other], d)
-            continue
-        count = 0
-        for x in range(width):
-            d, place = row[x], np.uint32(places[x])
-            flat[place] = max(flat[place], d)
-            chosen[count] = x
-            count += (beside[x] | above[x]) != 0
-        for x in chosen[:count]:  # again where one of them is 0, which costs less than to ask
-            d = row[x]
-            corner = np.int32(beside[x] + above[x])
-            for step in (beside[x], above[x], corner):
-                place = np.uint32(places[x] + step)
-                flat[place] = max(flat[place], d)
+        row[:width] = disparity[y]
+        for x in range(0, width, COUNT):
+            move_run(row, flat, np.int32(x), np.int32(y), size[0], size[1], by_x, by_y, spill)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -183,7 +160,7 @@ def vote(
     there. So a wrong near disparity is outvoted, while one that is hidden from the others holds.
 
     Args:
-        moved: float32 (N, H + 2, W + 2), px, or UNKNOWN; see `splat`.
+        moved: float32 (N, H + 2, W + 2 MARGIN), C-contiguous, px, or UNKNOWN; see `splat`.
         cameras: int64 (N,), which of the R real cameras were moved.
         maps: float32 (R, H, W), px, of every real camera.
         lumas: int16 (R, H + 4, W + 4, 2), see `view_planes.split_luma`; of any size where denial is 0.
@@ -196,30 +173,18 @@ def vote(
     who = np.empty(count, np.int64)
     near_px, least, share = np.float32(tolerance), np.float32(ratio), np.float32(denial)
     limits = near_px, np.float32(LEVELS * contrast)
-    nearest, farthest = np.empty(width, np.float32), np.empty(width, np.float32)
-    total, marks = np.empty(width, np.float32), np.empty(width, np.uint8)
+    flat, mean = moved.ravel(), np.empty(width + COUNT, np.float32)
+    step, stride = moved.shape[1] * moved.shape[2], moved.shape[2]
     chosen = np.empty(width, np.int32)
     for y in range(first, last):
-        mean = out[y]
-        mean[:] = 0
-        total[:] = 0
-        nearest[:] = UNKNOWN
-        farthest[:] = -UNKNOWN
-        for i in range(count):
-            row, weight = moved[i, y + 1, 1:-1], weights[i]
-            for x in range(width):  # vectorised: no branch
-                part = weight if row[x] > UNKNOWN else np.float32(0)
-                mean[x] += part * row[x]
-                total[x] += part
-                nearest[x] = max(nearest[x], row[x])
-                farthest[x] = min(farthest[x], row[x] if row[x] > UNKNOWN else -UNKNOWN)
-        for x in range(width):
-            mean[x] = mean[x] / total[x] if total[x] > 0 else UNKNOWN
-            marks[x] = nearest[x] - farthest[x] > near_px
-        for x in chosen[: list_marked(marks, chosen)]:
+        apart = 0
+        for x in range(0, width, COUNT):
+            found = vote_run(flat, weights, mean, (y + 1) * stride + MARGIN + x, step, x, near_px)
+            apart = list_bits(found, x, chosen, apart)
+        for x in chosen[:apart]:
             known = 0
             for i in range(count):
-                d = moved[i, y + 1, x + 1]
+                d = moved[i, y + 1, x + MARGIN]
                 if d > UNKNOWN:
                     place = known
                     while place > 0 and near[place - 1] < d:
@@ -232,6 +197,7 @@ def vote(
             mean[x] = _outvote(
                 x, y, near, who, known, cameras, maps, lumas, shifts, weights, limits, least, share
             )
+        out[y] = mean[:width]
 
 
 @njit(cache=True, nogil=True)

@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvcodec.kernels.runs import first_of
+
 BLOCK = 32
 """Marks that are asked together, in one vector."""
 
@@ -31,4 +33,14 @@ def list_marked(marks: NDArray[np.uint8], chosen: NDArray[np.int32]) -> int:
             for x in range(start, end):
                 chosen[count] = x
                 count += marks[x]
+    return count
+
+
+@njit(cache=True, nogil=True, inline="always")
+def list_bits(bits, x, chosen, count):  # type: ignore[no-untyped-def]
+    """Append the pixels that the bits say from x on to a list; how long it is then."""
+    while bits:
+        chosen[count] = x + first_of(bits)
+        count += 1
+        bits &= bits - np.uint32(1)
     return count

@@ -23,7 +23,7 @@ def make_room(count: int, height: int, width: int) -> Planes:
     Returns:
         Luma, int16 (R, H + 2 BORDER, W + 2 BORDER, 2), each pixel with the one below it; colour differences
         of that shape; disparity, float32 (R, H, W); and where it can be fetched, float32
-        (R, H + 2 BORDER, W + 2 BORDER). Before and behind them is memory that `view_runs` may read.
+        (R, H + 2 BORDER, W + 2 BORDER). Before and behind them is memory that runs of pixels may read.
     """
     padded = count, height + 2 * BORDER, width + 2 * BORDER
     return (

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from mvcodec.kernels.lanes import COUNT
 from mvcodec.kernels.quick_runs import add_run, place_columns, place_rows, store_run
+from mvcodec.kernels.runs import PLACES
 from mvcodec.kernels.view_fetch import distinct
-from mvcodec.kernels.view_runs import PLACES
 
 FloatMap = NDArray[np.float32]
 

@@ -44,9 +44,10 @@ def view_disparity(
         float32 (H, W), px, known everywhere.
     """
     from mvcodec.kernels.table import kernel
+    from mvcodec.kernels.view_depth import MARGIN
 
     _, height, width = maps.shape
-    moved = np.empty((len(seen.places), height + 2, width + 2), np.float32)
+    moved = np.empty((len(seen.places), height + 2, width + 2 * MARGIN), np.float32)
 
     def move(place: int, shift: NDArray[np.float32], out: FloatMap) -> None:
         kernel("view_depth.splat")(maps[place], shift[0], shift[1], ballot.reach_px, out)

@@ -1,0 +1,119 @@
+"""Runs of sixteen pixels for disparity at a view: moved there together, and averaged where cameras agree."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types  # Numba as a whole first: half of it fails while another thread imports it
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from mvcodec.kernels.lanes import COUNT, FLOAT, WORD, Lanes, constant, filled, loaded, store
+from mvcodec.kernels.runs import pointers, rounds
+
+UNKNOWN = -1e9
+"""Stands for a disparity that no camera knows; below any real one."""
+
+
+def _move_run(_typing, disparity, out, x, y, width, height, shift_x, shift_y, spill):  # type: ignore[no-untyped-def]
+    """Move sixteen pixels of a map's row to a view, nearest surface last; see `view_depth.splat`.
+
+    Args:
+        disparity: float32, the row from its first pixel on and COUNT - 1 numbers more, NaN.
+        out: flat float32, the view with its border.
+        x, y: int32, the first pixel.
+        width, height: int32, of the map.
+        shift_x, shift_y: float32, px that a pixel moves (left, up) for each px of disparity.
+        spill: float32, px beyond a pixel's middle from which on its neighbour is covered too.
+    """
+    arguments = disparity, out, x, y, width, height, shift_x, shift_y, spill
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        disparity, out = pointers(context, builder, signature, values, 2)
+        x, y, width, height, shift_x, shift_y, spill = values[2:]
+        index = ir.IntType(64)
+        d = loaded(builder, disparity, builder.sext(x, index), FLOAT)
+        known = d.is_("==", d)
+        stride = builder.add(width, ir.Constant(WORD, 2 * COUNT))
+        lanes = constant(builder, FLOAT, range(COUNT))
+        spill = filled(builder, spill)
+
+        one = constant(builder, WORD, [1] * COUNT)
+
+        def along(first, shift, length):  # type: ignore[no-untyped-def]
+            """The nearest pixel, 0 in the border, and which neighbour is covered too: -1, 1, 0 for none."""
+            target = first - filled(builder, shift) * d
+            target = target.within(-1.0, filled(builder, builder.sitofp(length, FLOAT)))
+            pixel = (target + 1.5).to_words()
+            part = target + 1.0 - pixel.to_floats()
+            return pixel, one.where(part.is_(">=", spill)) - one.where((part * -1.0).is_(">=", spill))
+
+        column, beside = along(filled(builder, builder.sitofp(x, FLOAT)) + lanes, shift_x, width)
+        row, above = along(filled(builder, builder.sitofp(y, FLOAT)), shift_y, height)
+        above_by = above * filled(builder, stride)
+        apart = row * filled(builder, stride) + column + COUNT - 1 - constant(builder, WORD, range(COUNT))
+
+        def work(offset, lanes):  # type: ignore[no-untyped-def]
+            place, said = builder.sext(offset, index), d.where(lanes, UNKNOWN)
+            there = loaded(builder, out, place, FLOAT)
+            store(there.most(said), out, place)
+
+        def some(lanes):  # type: ignore[no-untyped-def]
+            return builder.if_then(
+                builder.icmp_unsigned("!=", lanes.bits(), ir.Constant(ir.IntType(COUNT), 0))
+            )
+
+        rounds(builder, apart, known, work)
+        aside, over = beside.is_("!=", 0) & known, above.is_("!=", 0) & known
+        with some(aside | over):
+            for moved, also in ((beside, aside), (above_by, over), (beside + above_by, aside & over)):
+                with some(also):
+                    rounds(builder, apart + moved, also, work)
+        return context.get_dummy_value()
+
+    return types.void(*arguments), generate
+
+
+def _vote_run(_typing, moved, weights, out, place, step, at, tolerance):  # type: ignore[no-untyped-def]
+    """Means of what cameras say of sixteen pixels, each by its weight; UNKNOWN where none says anything.
+
+    Args:
+        moved: flat float32, disparities by camera, px or UNKNOWN.
+        weights: float32 (N,), of the cameras.
+        out: float32, overwritten from index `at` (intp) on.
+        place, step: intp, index of the first pixel as the first camera says it; from camera to camera.
+        tolerance: float32.
+
+    Returns:
+        uint32, where the nearest and the farthest are more than `tolerance` apart, the first pixel lowest.
+    """
+    arguments = moved, weights, out, place, step, at, tolerance
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        moved, weights, out = pointers(context, builder, signature, values, 3)
+        place, step, at, tolerance = values[3:]
+        count = context.make_array(signature.args[1])(context, builder, values[1])
+        count = builder.extract_value(count.shape, 0)
+        start = constant(builder, FLOAT, [0.0] * COUNT)
+        low, high = constant(builder, FLOAT, [UNKNOWN] * COUNT), constant(builder, FLOAT, [-UNKNOWN] * COUNT)
+        totals = [cgutils.alloca_once_value(builder, lanes.value) for lanes in (start, start, low, high)]
+        with cgutils.for_range(builder, count) as loop:
+            mean, total, nearest, farthest = (Lanes(builder, builder.load(each)) for each in totals)
+            d = loaded(builder, moved, builder.add(place, builder.mul(loop.index, step)), FLOAT)
+            known = d.is_(">", UNKNOWN)
+            part = filled(builder, builder.load(builder.gep(weights, [loop.index]))).where(known, 0.0)
+            sums = mean + part * d, total + part
+            ends = d.where(d.is_(">", nearest), nearest), d.where(d.is_("<", farthest) & known, farthest)
+            for each, lanes in zip(totals, (*sums, *ends), strict=True):
+                builder.store(lanes.value, each)
+        mean, total, nearest, farthest = (Lanes(builder, builder.load(each)) for each in totals)
+        some = total.is_(">", 0.0)
+        store((mean / total.where(some, 1.0)).where(some, UNKNOWN), out, at)
+        return builder.zext((nearest - farthest).is_(">", filled(builder, tolerance)).bits(), WORD)
+
+    return types.uint32(*arguments), generate
+
+
+move_run: Any = intrinsic(_move_run)
+vote_run: Any = intrinsic(_vote_run)
