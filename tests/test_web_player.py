@@ -218,6 +218,26 @@ def test_a_picture_that_stands_is_not_drawn_again(sample_page: Page) -> None:
     assert sample_page.evaluate("window.drawn") == drawn
 
 
+def test_a_picture_takes_two_draws_a_camera_and_one_a_view_at_most(sample_page: Page) -> None:
+    settled(sample_page)
+    draws = sample_page.evaluate("""async () => {
+        const { prototype } = WebGL2RenderingContext;
+        const { drawArrays } = prototype;
+        let count = 0;
+        prototype.drawArrays = function (...about) {
+            count++;
+            drawArrays.apply(this, about);
+        };
+        const player = document.querySelector("mvcodec-player");
+        await player.look(0.6, 1.3); // four cameras
+        await player.seek(4);
+        await player.settled();
+        prototype.drawArrays = drawArrays;
+        return count;
+    }""")
+    assert 1 <= draws <= 2 * 4 + 1
+
+
 def test_the_element_in_another_page(tab: Page, site: Site) -> None:
     site.put("square.mcap", SAMPLE.read_bytes())
     open_player(tab, site, "square.mcap", 'view="0.5,1.25"')
