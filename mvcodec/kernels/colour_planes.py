@@ -14,64 +14,66 @@ Row = NDArray[np.float32]
 
 
 @njit(cache=True, nogil=True)
-def _store(value: np.float32) -> np.uint8:
-    return np.uint8(min(max(value, np.float32(0.0)), np.float32(255.0)) + np.float32(0.5))
+def _byte(value: np.float32) -> np.uint8:
+    # By way of 32 bits: only that is vectorised.
+    return np.uint8(np.int32(min(max(value, np.float32(0.0)), np.float32(255.0)) + np.float32(0.5)))
 
 
 @njit(cache=True, nogil=True)
-def rgb_to_yuv420(rgb: Plane, matrix: NDArray[np.float32], y: Plane, u: Plane, v: Plane) -> None:
-    """Convert uint8 (H, W, 3) RGB, H and W even, into planes (H, W), (H/2, W/2), (H/2, W/2).
+def rgb_to_yuv420(channels: Plane, matrix: NDArray[np.float32], y: Plane, u: Plane, v: Plane) -> None:
+    """Convert R, G and B, uint8 (3, H, W), H and W even, into planes (H, W), (H/2, W/2), (H/2, W/2).
 
     `matrix` is float32 (3, 4): rows Y, Cb, Cr; columns R, G, B, offset.
     """
     height, width = y.shape
-    top, bottom = np.empty((3, width), np.float32), np.empty((3, width), np.float32)
-    cb, cr = np.empty(width + 6, np.float32), np.empty(width + 6, np.float32)
-    m = matrix
+    chroma = np.empty(width, np.float32)
+    even, odd = np.empty(width // 2, np.float32), np.empty(width // 2 + 3, np.float32)
     for j in range(height // 2):
-        _luma_row(rgb[2 * j], m, top, y[2 * j])
-        _luma_row(rgb[2 * j + 1], m, bottom, y[2 * j + 1])
-        for x in range(width):
-            red = np.float32(0.5) * (top[0, x] + bottom[0, x])
-            green = np.float32(0.5) * (top[1, x] + bottom[1, x])
-            blue = np.float32(0.5) * (top[2, x] + bottom[2, x])
-            cb[x + 3] = m[1, 0] * red + m[1, 1] * green + m[1, 2] * blue + m[1, 3]
-            cr[x + 3] = m[2, 0] * red + m[2, 1] * green + m[2, 2] * blue + m[2, 3]
-        _halve(cb, u[j])
-        _halve(cr, v[j])
+        top, bottom = channels[:, 2 * j], channels[:, 2 * j + 1]
+        _luma_row(top, matrix[0], y[2 * j])
+        _luma_row(bottom, matrix[0], y[2 * j + 1])
+        _chroma_row(top, bottom, matrix[1], chroma)
+        _halve(chroma, even, odd, u[j])
+        _chroma_row(top, bottom, matrix[2], chroma)
+        _halve(chroma, even, odd, v[j])
 
 
 @njit(cache=True, nogil=True)
-def _luma_row(line: Plane, m: NDArray[np.float32], channels: Row, out: Plane) -> None:
-    # Channels are taken apart first: only then does the arithmetic compile to vector instructions.
+def _luma_row(channels: Plane, m: Row, out: Plane) -> None:
+    red, green, blue = channels
     for x in range(out.shape[0]):
-        channels[0, x] = np.float32(line[x, 0])
-        channels[1, x] = np.float32(line[x, 1])
-        channels[2, x] = np.float32(line[x, 2])
+        value = m[0] * np.float32(red[x]) + m[1] * np.float32(green[x]) + m[2] * np.float32(blue[x]) + m[3]
+        out[x] = _byte(value)
+
+
+@njit(cache=True, nogil=True)
+def _chroma_row(top: Plane, bottom: Plane, m: Row, out: Row) -> None:
+    """The mean of two rows, Cb or Cr."""
     for x in range(out.shape[0]):
-        out[x] = _store(
-            m[0, 0] * channels[0, x] + m[0, 1] * channels[1, x] + m[0, 2] * channels[2, x] + m[0, 3]
-        )
+        red = np.float32(0.5) * (np.float32(top[0, x]) + np.float32(bottom[0, x]))
+        green = np.float32(0.5) * (np.float32(top[1, x]) + np.float32(bottom[1, x]))
+        blue = np.float32(0.5) * (np.float32(top[2, x]) + np.float32(bottom[2, x]))
+        out[x] = m[0] * red + m[1] * green + m[2] * blue + m[3]
 
 
 @njit(cache=True, nogil=True)
-def _halve(line: Row, out: Plane) -> None:
-    """Half-band filter (-1 0 9 16 9 0 -1)/32 at the even columns; `line` has 3 places of margin."""
-    line[:3] = line[3]
-    line[-3:] = line[-4]
-    for i in range(out.shape[0]):
-        x = 2 * i + 3
-        out[i] = _store(
-            np.float32(0.5) * line[x]
-            + np.float32(0.28125) * (line[x - 1] + line[x + 1])
-            - np.float32(0.03125) * (line[x - 3] + line[x + 3])
+def _halve(line: Row, even: Row, odd: Row, out: Plane) -> None:
+    """Half-band filter (-1 0 9 16 9 0 -1)/32 at the even columns; the ends are repeated.
+
+    `even` and `odd` are room for as many numbers as come out, and for 3 more. Taken apart first, columns lie
+    side by side in memory, as vector instructions want them.
+    """
+    count = out.shape[0]
+    for i in range(count):
+        even[i], odd[i + 2] = line[2 * i], line[2 * i + 1]
+    odd[0] = odd[1] = line[0]
+    odd[count + 2] = line[2 * count - 1]
+    for i in range(count):
+        out[i] = _byte(
+            np.float32(0.5) * even[i]
+            + np.float32(0.28125) * (odd[i + 1] + odd[i + 2])
+            - np.float32(0.03125) * (odd[i] + odd[i + 3])
         )
-
-
-@njit(cache=True, nogil=True)
-def _byte(value: np.float32) -> np.uint8:
-    # By way of 32 bits: only that is vectorised.
-    return np.uint8(np.int32(min(max(value, np.float32(0.0)), np.float32(255.0)) + np.float32(0.5)))
 
 
 @njit(cache=True, nogil=True)
@@ -114,7 +116,7 @@ def yuv420_to_rgb(y: Plane, u: Plane, v: Plane, matrix: NDArray[np.float32], rgb
         _double(u[near], u[far], half, odd, cb)
         _double(v[near], v[far], half, odd, cr)
         line, out = y[row], rgb[row].ravel()
-        # Channels are put together last, as they are taken apart first in `_luma_row`.
+        # Channels are put together last: only then is the rest compiled to vector instructions.
         for x in range(width):
             luma = gain * np.float32(line[x]) + offset
             red[x] = _byte(luma + red_cr * cr[x])

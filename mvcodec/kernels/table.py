@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextvars
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from typing import Any
 
@@ -21,6 +21,7 @@ Implementation = Callable[[], Callable[..., Any]]
 """Loads it: a module that nobody asks for is not imported."""
 
 
+@cache
 def _here(name: str) -> Callable[..., Any]:
     module, function = name.split(".")
     found: Callable[..., Any] = getattr(import_module(f"mvcodec.kernels.{module}"), function)

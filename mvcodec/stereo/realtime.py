@@ -85,7 +85,10 @@ class Realtime:
 
 def _halved(picture: Picture) -> Picture:
     height, width = picture.shape[:2]
-    even = cv2.copyMakeBorder(picture, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
+    even = picture
+    if height % 2 or width % 2:
+        border = 0, height % 2, 0, width % 2
+        even = np.asarray(cv2.copyMakeBorder(picture, *border, cv2.BORDER_REPLICATE), np.uint8)
     size = even.shape[1] // 2, even.shape[0] // 2
     return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
 
@@ -96,5 +99,8 @@ def _doubled(small: DisparityMap, picture: Picture, shrunk: Picture) -> Disparit
     height, width = picture.shape[:2]
     values_px = np.empty((height, width), np.float32)
     kernel("enlargement.enlarge")(small.values_px * 2, picture, shrunk, AGREEMENT_PX, COLOUR_STEP, values_px)
-    valid = small.valid.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
-    return DisparityMap(values_px, valid)
+    size = 2 * small.valid.shape[1], 2 * small.valid.shape[0]
+    valid = np.asarray(
+        cv2.resize(small.valid.view(np.uint8), size, interpolation=cv2.INTER_NEAREST), np.uint8
+    )
+    return DisparityMap(values_px, valid[:height, :width].view(np.bool_))

@@ -7,6 +7,7 @@ last row and column, and cropped again.
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,7 +64,9 @@ def to_planes(picture: Picture) -> Planes:
     y = np.empty((height, width), np.uint8)
     u = np.empty((height // 2, width // 2), np.uint8)
     v = np.empty_like(u)
-    rgb_to_yuv420(rgb, _FORWARD, y, u, v)
+    channels = np.empty((3, height, width), np.uint8)
+    cv2.split(rgb, list(channels))
+    rgb_to_yuv420(channels, _FORWARD, y, u, v)
     return Planes(y, u, v)
 
 
