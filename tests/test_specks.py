@@ -16,8 +16,9 @@ from mvcodec.synthesis.layered import Layered, LayeredSettings
 
 
 def smoothed(disparity: FloatMap, step: float = 1.5, reach: int = 1, fewest: int = 30) -> FloatMap:
-    out = np.empty_like(disparity)
-    smooth_over(disparity, step, reach, fewest, out)
+    out, cut = disparity.copy(), len(disparity) // 3
+    for first, last in ((cut, len(disparity)), (0, cut)):
+        smooth_over(disparity, step, reach, fewest, out, first, last)
     return out
 
 

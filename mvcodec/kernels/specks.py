@@ -48,15 +48,19 @@ def _gather(disparity, y, x, step, reach, gathered, rows, columns, around):  # t
 
 
 @njit(cache=True, nogil=True)
-def smooth_over(disparity: FloatMap, step: float, reach: int, fewest: int, out: FloatMap) -> None:
-    """Give pieces of fewer than `fewest` pixels the median of what is around them.
+def smooth_over(
+    disparity: FloatMap, step: float, reach: int, fewest: int, out: FloatMap, first: int, last: int
+) -> None:
+    """Give pieces of fewer than `fewest` pixels the median of what is around them: in rows first..last-1.
+
+    A piece that lies in several bands of rows is found in each of them, and comes out the same.
 
     Args:
         disparity: float32 (H, W), px, C-contiguous.
         step: pixels that differ by no more are of one piece, px,
         reach: if they are no further apart than this, px along rows and columns.
         fewest: 1 or more; 1 changes nothing.
-        out: float32 (H, W), written.
+        out: float32 (H, W), a copy of `disparity`, changed in place.
     """
     height, width = disparity.shape
     apart = np.float32(step)
@@ -64,8 +68,7 @@ def smooth_over(disparity: FloatMap, step: float, reach: int, fewest: int, out: 
     rows, columns = np.empty((2, fewest), np.int32)
     around = np.empty(8 * fewest, np.float32)
     marks, chosen = np.empty(width, np.uint8), np.empty(width, np.int32)
-    out[:] = disparity
-    for y in range(height):
+    for y in range(first, last):
         above, here, below = disparity[max(y - 1, 0)], disparity[y], disparity[min(y + 1, height - 1)]
         for x in range(width):
             marks[x] = max(abs(above[x] - here[x]), abs(below[x] - here[x])) > apart

@@ -93,10 +93,9 @@ def without_specks(values_px: FloatMap, fewest: int) -> FloatMap:
     """
     from mvcodec.kernels.table import kernel
 
-    smooth = np.empty_like(values_px)
-    kernel("specks.smooth_over")(
-        np.ascontiguousarray(values_px), SPECK_STEP_PX, SPECK_REACH_PX, fewest, smooth
-    )
+    smooth = np.array(values_px, order="C")
+    pieces = np.ascontiguousarray(values_px), SPECK_STEP_PX, SPECK_REACH_PX, fewest, smooth
+    kernel("specks.smooth_over")(*pieces, 0, len(smooth))
     return smooth
 
 

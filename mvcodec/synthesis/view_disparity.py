@@ -80,6 +80,7 @@ def view_disparity(
     run_in_bands(height, clean)
     if ballot.speck_area_px == 1:
         return cleaned
-    smooth = np.empty_like(cleaned)
-    kernel("specks.smooth_over")(cleaned, ballot.tolerance_px, 1, ballot.speck_area_px, smooth)
+    smooth = cleaned.copy()
+    pieces = cleaned, ballot.tolerance_px, 1, ballot.speck_area_px, smooth
+    run_in_bands(height, kernel("specks.smooth_over"), *pieces)
     return smooth
