@@ -76,7 +76,9 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
         note="; auto: estimated whatever the input states. Widened where the pictures show more",
     )
     parser.add_argument(
-        "--exact-range", action="store_true", help="take --disparity-range as it stands, whatever they show"
+        "--exact-range",
+        action="store_true",
+        help="take --disparity-range as it stands, whatever the pictures show",
     )
     add_setting(parser, EncoderConfig, "gop")
     add_setting(

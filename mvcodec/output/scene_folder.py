@@ -73,7 +73,7 @@ def make_sample(
     if rig is None:
         return make_scene(scene, settings)
     if scene != DEFAULT_SCENE:
-        raise SettingError("rig", f"with the scene {scene}", f"the scene {DEFAULT_SCENE}, which is rendered")
+        raise SettingError("rig", f"with the scene {scene}", f"the scene {DEFAULT_SCENE}")
     return RoughScene.of(settings or SceneSettings(), rig)
 
 

@@ -42,7 +42,7 @@ class SceneSettings:
 
     grid: tuple[int, int] | None = setting(
         None,
-        f"(rows, cols) of views (default: {show(_ROOM_GRID)}, of a pair 1x2)",
+        f"(rows, cols) of views (default: {show(_ROOM_GRID)}, of other scenes than room their own)",
         low=1,
         high=MAX_GRID_SIDE,
         expected=f"RxC, each 1..{MAX_GRID_SIDE}",
@@ -52,7 +52,7 @@ class SceneSettings:
     )
     size: tuple[int, int] | None = setting(
         None,
-        f"(width, height) of the pictures, px (default: {show(_ROOM_SIZE)}, or that of the photographs)",
+        f"(width, height) of the pictures, px (default: {show(_ROOM_SIZE)}, of other scenes their own)",
         low=_MIN_SIDE,
         high=MAX_PICTURE_SIDE,
         expected=f"WxH px, each {_MIN_SIDE}..{MAX_PICTURE_SIDE}",
