@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -20,7 +21,15 @@ from mvcodec.errors import SettingError, StreamError
 from mvcodec.stream import TrackKind
 from mvcodec.video import annexb
 from mvcodec.video.bits import BitReader
-from mvcodec.video.codec import PRESETS, Codec, CodedPicture, RateControl, VideoSettings
+from mvcodec.video.codec import (
+    PRESETS,
+    Codec,
+    CodedPicture,
+    Planes,
+    RateControl,
+    VideoDecoder,
+    VideoSettings,
+)
 from mvcodec.video.codecs import CODECS, find_codec
 from mvcodec.video.colour import grey_planes, to_picture, to_planes
 from mvcodec.video.disparity_code import dequantise, quantise
@@ -62,6 +71,24 @@ def test_one_picture_in_one_access_unit_out_and_back(codec: Codec, preset: str) 
         error = to_picture(planes, WIDTH, HEIGHT).astype(float) - _picture(number)
         assert math.sqrt(np.mean(error**2)) < 8, "not the picture that went in"
     assert decoder.flush() == []
+
+
+def test_a_picture_that_is_looked_at_late_is_still_itself(codec: Codec) -> None:
+    """Planes are copied when somebody looks: the decoder must not have drawn the next picture over them."""
+    coded = _coded(codec, _settings(), 7)
+    at_once, late = codec.decoder(), codec.decoder()
+    expected = [np.concatenate([p.y.ravel(), p.u.ravel(), p.v.ravel()]) for p in _pushed(at_once, coded)]
+    kept = list(_pushed(late, coded))
+    for planes, values in zip(kept, expected, strict=True):
+        assert planes.size == (WIDTH, HEIGHT)
+        found = np.concatenate([planes.y.ravel(), planes.u.ravel(), planes.v.ravel()])
+        np.testing.assert_array_equal(found, values)
+        assert planes.y is planes.y, "copied once"
+
+
+def _pushed(decoder: VideoDecoder, coded: list[CodedPicture]) -> Iterator[Planes]:
+    for picture in coded:
+        yield from decoder.push(picture.data, "test")
 
 
 def test_keyframes_come_when_asked_and_decoding_can_start_at_each(codec: Codec) -> None:

@@ -48,6 +48,12 @@ class Planes:
     u: Plane
     v: Plane
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """(W, H)."""
+        height, width = self.y.shape
+        return width, height
+
 
 def _bit_rate(text: str) -> float:
     """kbit/s: ``2000``, ``2000k`` or ``2M``."""

@@ -144,9 +144,50 @@ def _view(plane: VideoPlane, rows: int, cols: int) -> Plane:
     return np.frombuffer(buffer, np.uint8).reshape(-1, plane.line_size)[:rows, :cols]
 
 
+class _FramePlanes(Planes):
+    """Planes of a frame, copied out of it when somebody first looks: what is only passed costs no copy.
+
+    The copies are contiguous for the kernels, and free of the decoder's own buffers.
+    """
+
+    __slots__ = ("_copies", "_frame", "_size")
+    _copies: tuple[Plane, Plane, Plane] | None
+    _frame: VideoFrame | None
+    _size: tuple[int, int]
+
+    def __init__(self, frame: VideoFrame) -> None:
+        object.__setattr__(self, "_frame", frame)
+        object.__setattr__(self, "_copies", None)
+        object.__setattr__(self, "_size", (frame.width, frame.height))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self._size
+
+    def _look(self) -> tuple[Plane, Plane, Plane]:
+        frame, copies = self._frame, self._copies  # in this order: the frame is let go of last
+        if copies is None:
+            assert frame is not None
+            y, u, v = (np.ascontiguousarray(_view(part, part.height, part.width)) for part in frame.planes)
+            copies = y, u, v
+            object.__setattr__(self, "_copies", copies)
+            object.__setattr__(self, "_frame", None)
+        return copies
+
+    @property
+    def y(self) -> Plane:
+        return self._look()[0]
+
+    @property
+    def u(self) -> Plane:
+        return self._look()[1]
+
+    @property
+    def v(self) -> Plane:
+        return self._look()[2]
+
+
 def _planes(frame: VideoFrame, label: str) -> Planes:
     if frame.format.name not in ("yuv420p", "yuvj420p"):
         raise StreamError(label, f"pictures of format {frame.format.name}", "yuv420p")
-    # Copies: contiguous for the kernels, and free of the decoder's own buffers.
-    y, u, v = (np.ascontiguousarray(_view(plane, plane.height, plane.width)) for plane in frame.planes)
-    return Planes(y, u, v)
+    return _FramePlanes(frame)

@@ -56,7 +56,7 @@ class TrackDecoder:
         found = self._decoder.push(data, label)
         if len(found) != 1:
             raise StreamError(label, f"{len(found)} pictures in an access unit", "one")
-        height, width = found[0].y.shape
+        width, height = found[0].size
         if (width, height) != self._size:
             raise StreamError(label, f"a picture of {width}x{height}", f"{self._size[0]}x{self._size[1]}")
         return found[0]
