@@ -21,7 +21,7 @@ from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.errors import MvCodecWarning, SettingError, StreamError
 from mvcodec.frames import DecodedSet, DisparityMap, FloatMap
 from mvcodec.kernels.map_projection import from_steps, merge, to_steps
-from mvcodec.kernels.view_depth import UNKNOWN, splat
+from mvcodec.kernels.view_depth import MARGIN, UNKNOWN, splat
 from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, map_cameras
 
 FAR_PX, NEAR_PX = -2.0, 9.0
@@ -34,9 +34,9 @@ def test_whole_maps_have_no_cracks(right: float, down: float) -> None:
     # A slanted wall: where the other camera sees it, its pixels stand 1.3 px apart.
     rows, columns = np.mgrid[:40, :50]
     slope = (0.3 * (rows if down else -columns)).astype(np.float32)
-    out = np.empty((42, 52), np.float32)
+    out = np.empty((42, 50 + 2 * MARGIN), np.float32)
     splat(slope, right, down, REACH, out)
-    assert (out[1:31, 1:31] > UNKNOWN).all()
+    assert (out[1:31, MARGIN : MARGIN + 30] > UNKNOWN).all()
 
 
 @settings(max_examples=20, deadline=None)
@@ -47,7 +47,7 @@ def test_the_merging_kernel_is_its_twin(seed: int, count: int) -> None:
     seen = (rng.integers(-40, 41, (count, 5, 7)) / 8).astype(np.float32)
     seen[rng.random(seen.shape) < 0.3] = UNKNOWN
     values, known = np.empty((5, 7), np.float32), np.empty((5, 7), np.bool_)
-    merge(np.pad(seen, ((0, 0), (1, 1), (1, 1))), 2.0, values, known)
+    merge(np.pad(seen, ((0, 0), (1, 1), (MARGIN, MARGIN))), 2.0, values, known)
     np.testing.assert_array_equal(known, (seen > UNKNOWN).any(axis=0))
     for place in np.ndindex(5, 7):
         of_pixel = seen[(slice(None), *place)]

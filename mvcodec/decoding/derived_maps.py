@@ -43,11 +43,11 @@ def derive_map(
         both sides on the row goes on.
     """
     from mvcodec.kernels.map_projection import merge
-    from mvcodec.kernels.view_depth import fill_background, splat
+    from mvcodec.kernels.view_depth import MARGIN, fill_background, splat
 
     distances = {other: _distance(array, camera, other) for other in maps}
     helpers = [other for other in sorted(maps) if distances[other] == min(distances.values())]
-    seen = np.empty((len(helpers), array.height + 2, array.width + 2), np.float32)
+    seen = np.empty((len(helpers), array.height + 2, array.width + 2 * MARGIN), np.float32)
     for other, out in zip(helpers, seen, strict=True):
         right, down = array.shift_per_disparity(other, Viewpoint(*camera))
         splat(maps[other].values_px, right, down, REACH, out)

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvcodec.kernels.view_depth import UNKNOWN
+from mvcodec.kernels.view_depth import MARGIN, UNKNOWN
 
 FloatMap = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -17,7 +17,7 @@ def merge(seen: NDArray[np.float32], agreement: float, values: FloatMap, known: 
     """The nearest of several maps at each pixel, averaged with those that agree with it.
 
     Args:
-        seen: float32 (K, H + 2, W + 2), px, see `view_depth.splat`.
+        seen: float32 (K, H + 2, W + 2 MARGIN), px, see `view_depth.splat`.
         agreement: px; what is farther than the nearest by less agrees.
         values: float32 (H, W) out; UNKNOWN where nothing is known.
         known: bool (H, W) out.
@@ -27,15 +27,15 @@ def merge(seen: NDArray[np.float32], agreement: float, values: FloatMap, known: 
     agreeing = np.empty(width, np.float32)
     within = np.float32(agreement)
     for y in range(height):
-        nearest[:] = seen[0, y + 1, 1:-1]
+        nearest[:] = seen[0, y + 1, MARGIN:-MARGIN]
         for k in range(1, count):
-            row = seen[k, y + 1, 1:-1]
+            row = seen[k, y + 1, MARGIN:-MARGIN]
             for x in range(width):
                 nearest[x] = max(nearest[x], row[x])
         total[:] = 0
         agreeing[:] = 0
         for k in range(count):
-            row = seen[k, y + 1, 1:-1]
+            row = seen[k, y + 1, MARGIN:-MARGIN]
             for x in range(width):
                 agrees = (row[x] > nearest[x] - within) & (row[x] > UNKNOWN)
                 total[x] += row[x] if agrees else np.float32(0)
