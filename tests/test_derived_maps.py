@@ -39,6 +39,12 @@ def test_whole_maps_have_no_cracks(right: float, down: float) -> None:
     assert (out[1:31, MARGIN : MARGIN + 30] > UNKNOWN).all()
 
 
+def test_a_map_is_not_moved_to_where_it_has_no_room() -> None:
+    slope = np.zeros((40, 50), np.float32)
+    with pytest.raises(ValueError, match="border"):
+        splat(slope, 1.0, 0.0, REACH, np.empty((42, 52), np.float32))
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 4))
 def test_the_merging_kernel_is_its_twin(seed: int, count: int) -> None:

@@ -40,8 +40,13 @@ def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out
         out: float32 (H + 2, W + 2 MARGIN), C-contiguous, overwritten: the view with a border of one row and
             MARGIN columns, of which the inner one is where whatever leaves the picture lands; UNKNOWN where
             nothing does.
+
+    Raises:
+        ValueError: `out` is of another shape: runs of pixels would be written outside of it.
     """
     height, width = disparity.shape
+    if out.shape != (height + 2, width + 2 * MARGIN):
+        raise ValueError("a view without its border")
     by_x, by_y, spill = np.float32(shift_x), np.float32(shift_y), np.float32(1) - np.float32(reach)
     flat = out.ravel()
     flat[:] = UNKNOWN
