@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,10 +14,12 @@ from mvcodec.scenes.rough_rig import FLAWS
 
 EUROC = Path(__file__).parents[2] / "shared" / "data" / "euroc_raw"
 IN_STEP = tuple(flaw for flaw in FLAWS if flaw != "delay")
-
+IN_PLACE = tuple(flaw for flaw in IN_STEP if flaw != "positions")
 
 MOST_CPU_S = 20.0
 """10 s on two cores."""
+
+best = cache(ideal_db)
 
 
 def check(found: Measured, apart_db: float) -> None:
@@ -31,16 +34,27 @@ def check(found: Measured, apart_db: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 4])
-def test_a_rough_rig_is_found(seed: int) -> None:
-    found = measure(seed, (2, 2), IN_STEP, ideal_db((2, 2)))
-    check(found, 2.0)
+@pytest.mark.parametrize("seed", [1, 5])
+def test_a_rough_rig_comes_within_1_db_of_the_ideal_one(seed: int) -> None:
+    found = measure(seed, (2, 2), IN_PLACE, best((2, 2)))
+    check(found, 1.0)
     assert found.cpu_s < MOST_CPU_S
 
 
 @pytest.mark.slow
-def test_a_rough_rig_of_nine_is_found() -> None:
-    check(measure(1, (3, 3), IN_STEP, ideal_db((3, 3))), 2.0)
+def test_a_rig_of_nine_comes_within_1_db_of_the_ideal_one() -> None:
+    check(measure(1, (3, 3), IN_PLACE, best((3, 3))), 1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 4])
+def test_cameras_beside_their_places_cost_another_1_db_at_most(seed: int) -> None:
+    check(measure(seed, (2, 2), IN_STEP, best((2, 2))), 2.0)
+
+
+@pytest.mark.slow
+def test_with_all_flaws_a_late_camera_is_put_in_step() -> None:
+    check(measure(2, (2, 2), FLAWS, best((2, 2)), sync=True), 2.0)
 
 
 @pytest.mark.slow
