@@ -229,13 +229,13 @@ def test_a_viewer_that_draws_nothing_gets_two_pictures(server: Running) -> None:
     assert viewer.undrawn == 2
 
 
-def test_plays_to_the_end_and_steps_back_from_there(server: Running) -> None:
+def test_plays_to_the_end_and_goes_back_from_there(server: Running) -> None:
     with Viewer(server) as viewer:
         viewer.say("speed", factor=4)
         viewer.say("play", playing=True)
         viewer.say("ready")
         assert viewer.picture_of(frame=FRAMES - 1).facts["dropped"] < FRAMES
-        viewer.say("step", frames=-1)
+        viewer.say("seek", frame=FRAMES - 2)
         assert viewer.next_picture().facts["frame"] == FRAMES - 2
         assert viewer.state["playing"] is False
 

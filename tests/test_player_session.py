@@ -21,7 +21,6 @@ from mvcodec.player.messages import (
     Show,
     Shown,
     Speed,
-    Step,
 )
 from mvcodec.player.session import MAX_IN_FLIGHT, PictureRequest, Session
 
@@ -98,12 +97,13 @@ def test_no_more_pictures_are_made_than_the_page_draws() -> None:
     assert found.viewpoint == Viewpoint(2.0, 2.5)
 
 
-@pytest.mark.parametrize("by", [1, -1, 7])
-def test_a_step_is_exact_and_stops(by: int) -> None:
+def test_a_pause_stays_at_its_frame_and_seeking_from_there_is_exact() -> None:
     session = ready(Seek(20), Play(True))
     assert request(session, 0.31).frame == 23
-    session.apply(Step(by), 0.5)
-    assert request(session, 0.9).frame == 23 + by
+    session.apply(Play(False), 0.35)
+    assert session.next_request(0.9) is None
+    session.apply(Seek(22), 0.9)
+    assert request(session, 0.9).frame == 22
     assert not session.state["playing"]
 
 

@@ -40,13 +40,6 @@ class Seek:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
-    """Stop, and go so many frames on (back where negative) from the frame at hand."""
-
-    frames: int
-
-
-@dataclass(frozen=True, slots=True)
 class Play:
     """Play or pause."""
 
@@ -130,21 +123,7 @@ class Shown:
 
 
 Message = (
-    Ready
-    | Move
-    | Seek
-    | Step
-    | Play
-    | Speed
-    | Loop
-    | Section
-    | Show
-    | Eyes
-    | Dolly
-    | Focus
-    | Wipe
-    | Probe
-    | Shown
+    Ready | Move | Seek | Play | Speed | Loop | Section | Show | Eyes | Dolly | Focus | Wipe | Probe | Shown
 )
 
 
@@ -234,7 +213,6 @@ _FORMS: dict[str, tuple[dict[str, _Check], Callable[..., Message]]] = {
     "ready": ({}, Ready),
     "move": ({"row": _number, "col": _number}, lambda row, col: Move(Viewpoint(row, col))),
     "seek": ({"frame": _whole}, Seek),
-    "step": ({"frames": _whole}, Step),
     "play": ({"playing": _truth}, Play),
     "speed": ({"factor": _speed}, Speed),
     "loop": ({"loop": _truth}, Loop),

@@ -30,7 +30,6 @@ from mvcodec.player.messages import (
     Show,
     Shown,
     Speed,
-    Step,
     Wipe,
 )
 from mvcodec.synthesis.towards_enhanced import views_near
@@ -119,8 +118,7 @@ class Session:
     @property
     def state(self) -> dict[str, Any]:
         """What the page must know of playback, as plain JSON values."""
-        clock = self._clock
-        return {"playing": clock.playing, "speed": clock.speed, "loop": clock.loop, "section": clock.section}
+        return {"playing": self._clock.playing}
 
     @property
     def dropped(self) -> int:
@@ -134,7 +132,7 @@ class Session:
                 self._ready = True
             case Shown(picture):
                 self._note_shown(picture, now_s)
-            case Seek() | Step() | Play() | Speed() | Loop() | Section():
+            case Seek() | Play() | Speed() | Loop() | Section():
                 self._steer(message, now_s)
             case _:
                 self._want(message, now_s)
@@ -145,9 +143,6 @@ class Session:
         match message:
             case Seek(frame):
                 clock.seek(frame, now_s)
-            case Step(frames):
-                clock.play(False, now_s)
-                clock.seek(clock.frame + frames, now_s)
             case Play(playing):
                 clock.play(playing, now_s)
                 self._keeps_up = True
