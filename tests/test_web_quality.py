@@ -10,7 +10,7 @@ import pytest
 from browser_page import CHROMIUM, NO_CHROMIUM, pixels_of
 from numpy.typing import NDArray
 from player_files import encode, write_original
-from playwright.sync_api import Page
+from playwright.sync_api import Browser, Page
 from web_fixtures import Site, open_player
 
 from mvcodec.array import Viewpoint
@@ -27,6 +27,13 @@ pytest_plugins = ("web_fixtures",)
 DATA = Path(__file__).parents[2] / "shared" / "data"
 BELOW_DB = {("page", "quick"): 0.5, ("page", "layered"): 1.0, ("draft", "quick"): 1.0}
 """How far the page's mean over the views may lie below a synthesizer's; a draft is what moves."""
+
+MESA = ("--no-sandbox", "--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist")
+RENDERER = """() => {
+    const gl = document.createElement("canvas").getContext("webgl2");
+    const names = gl?.getExtension("WEBGL_debug_renderer_info");
+    return names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "none";
+}"""
 
 
 def first_of(file: Path) -> DecodedSet:
@@ -102,6 +109,25 @@ def test_the_same_view_has_the_same_pixels_every_time(tab: Page, site: Site, roo
     first = view_of(tab, 0.8, 1.3)
     view_of(tab, 2, 0)
     assert np.array_equal(view_of(tab, 0.8, 1.3), first)
+
+
+def test_another_gl_draws_the_same(chromium: Browser, tab: Page, site: Site, room: tuple[Path, Path]) -> None:
+    # The other pages draw by SwiftShader; Mesa's drivers are what many GPUs are driven by.
+    original, file = room
+    site.put("room.mcap", file.read_bytes())
+    other = chromium.browser_type.launch(executable_path=CHROMIUM, args=list(MESA))
+    page = other.new_page()
+    if "Mesa" not in page.evaluate(RENDERER):
+        other.close()
+        pytest.skip("Chromium finds no Mesa (Debian: apt install libegl1 libgl1-mesa-dri)")
+    open_player(tab, site, "room.mcap")
+    open_player(page, site, "room.mcap")
+    pictures = original_of(original).pictures
+    for view in ((1, 1), (0, 1), (1, 0), (2, 2)):
+        ours, theirs = view_of(tab, *view), view_of(page, *view)
+        assert psnr(ours, theirs) > 48
+        assert psnr(pictures[view], theirs) == pytest.approx(psnr(pictures[view], ours), abs=0.1)
+    other.close()
 
 
 @pytest.mark.slow
