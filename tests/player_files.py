@@ -137,19 +137,29 @@ class Viewer:
     def next_picture(self, timeout: float = 20) -> Received:
         """The next picture, acknowledged."""
         while True:
-            message = self.socket.recv(timeout)
-            if isinstance(message, str):
-                document = json.loads(message)
-                if document["type"] == "state":
-                    self.state = document
-                else:
-                    raise AssertionError(document["message"])
-                continue
-            (length,) = struct.unpack(">I", message[:4])
-            facts = json.loads(message[4 : 4 + length])
-            self.say("shown", picture=facts["picture"])
-            coded = np.frombuffer(message, np.uint8, offset=4 + length)
-            return Received(facts, decode_picture(coded))
+            received = self._take(timeout)
+            if received is not None:
+                return received
+
+    def wait_until_stopped(self) -> None:
+        """Draw what comes until the server says that it no longer plays."""
+        while self.state.get("playing") is not False:
+            self._take(20)
+
+    def _take(self, timeout: float) -> Received | None:
+        """Take one message: a picture, acknowledged; None: what was said of the state, kept."""
+        message = self.socket.recv(timeout)
+        if isinstance(message, str):
+            document = json.loads(message)
+            if document["type"] != "state":
+                raise AssertionError(document["message"])
+            self.state = document
+            return None
+        (length,) = struct.unpack(">I", message[:4])
+        facts = json.loads(message[4 : 4 + length])
+        self.say("shown", picture=facts["picture"])
+        coded = np.frombuffer(message, np.uint8, offset=4 + length)
+        return Received(facts, decode_picture(coded))
 
     def picture_of(self, **wanted: object) -> Received:
         """The first picture whose facts are these."""
