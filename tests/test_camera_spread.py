@@ -49,6 +49,15 @@ def test_noise_widens_and_misplacement_narrows() -> None:
     assert measure_spread(noisy(misplaced(scene(), 0.8), 2.0)) < grainy
 
 
+def test_plain_surroundings_do_not_hide_that_edges_are_misplaced() -> None:
+    off = misplaced(scene(), 0.8)
+    flat = {camera: picture.copy() for camera, picture in off.pictures.items()}
+    for picture in flat.values():
+        picture[: 3 * len(picture) // 4] = 90
+    assert measure_spread(off) == LEAST
+    assert measure_spread(replace(off, pictures=flat)) == LEAST
+
+
 def test_noise_alone_asks_for_an_even_average() -> None:
     assert measure_spread(noisy(scene(), 6.0)) == MOST
 

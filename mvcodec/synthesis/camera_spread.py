@@ -33,6 +33,8 @@ LEAST, MOST = 0.05, 1.5
 SAME_SURFACE_PX = 1.0
 OUTLIER = 30.0
 """Differences count as at most this many times their median."""
+LEAST_MEDIAN = 1.0
+"""Grey levels that counts as at least: it is 0 where pictures are plain, and edges would not count then."""
 
 SAMPLES = 10_000
 """Pixels of each picture, about."""
@@ -113,4 +115,5 @@ def _difference(
     fetched = cv2.remap(lumas[other], x, y, cv2.INTER_CUBIC).astype(np.float32)
     difference = (fetched - lumas[one][::step, ::step])[seen]
     size = np.abs(difference - np.median(difference))
-    return float(np.mean(np.minimum(size, OUTLIER * np.median(size) + 1) ** 2))
+    most = OUTLIER * max(float(np.median(size)), LEAST_MEDIAN) + 1
+    return float(np.mean(np.minimum(size, most) ** 2))
