@@ -258,10 +258,13 @@ def _cheapest(sums, least, best):  # type: ignore[no-untyped-def]
     least[:], best[:] = sums[0], 0
     for level in range(1, levels):
         here = sums[level]
+        number = np.uint16(level)
         for x in range(width):
-            lower = here[x] < least[x]
-            least[x] = here[x] if lower else least[x]
-            best[x] = np.uint16(level) if lower else best[x]
+            # Everything is loaded before anything is chosen: only that is vectorised.
+            value, lowest, at = here[x], least[x], best[x]
+            lower = value < lowest
+            least[x] = value if lower else lowest
+            best[x] = number if lower else at
 
 
 @njit(cache=True, nogil=True)
@@ -293,10 +296,11 @@ def winners(sums: SumVolume, low: int, disparity: FloatMap) -> None:
 @njit(cache=True, nogil=True)
 def _take_lower(sums, here, level, count, there, least, best):  # type: ignore[no-untyped-def]
     for x in range(count):
-        same = (sums[here + x] == least[there + x]) & (level < best[there + x])
-        lower = (sums[here + x] < least[there + x]) | same
-        least[there + x] = sums[here + x] if lower else least[there + x]
-        best[there + x] = level if lower else best[there + x]
+        # Everything is loaded before anything is chosen: only that is vectorised.
+        value, lowest, at = sums[here + x], least[there + x], best[there + x]
+        lower = (value < lowest) | ((value == lowest) & (level < at))
+        least[there + x] = value if lower else lowest
+        best[there + x] = level if lower else at
 
 
 @njit(cache=True, nogil=True)
