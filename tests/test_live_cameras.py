@@ -17,7 +17,7 @@ from typing import Any
 import av
 import numpy as np
 import pytest
-from command_line import COMMAND, fails
+from command_line import COMMAND, fails, succeeds
 from live_senders import FPS, NUMBERS, Sender, Server, free_port, transport_stream
 from timed_videos import number_of, numbered
 
@@ -25,7 +25,9 @@ from mvcodec.capture.live_address import Opened, how_to_open, is_live_address
 from mvcodec.capture.live_camera import LiveCamera
 from mvcodec.capture.live_cameras import LiveCameras, LiveSettings
 from mvcodec.capture.live_clock import HELD_BACK, ArrivalClock, common_clock
+from mvcodec.conformance.validation import validate
 from mvcodec.container import read_info
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.errors import InputError, SettingError
 
 in_real_time = pytest.mark.slow
@@ -110,6 +112,33 @@ def test_a_camera_that_breaks_off_is_opened_again() -> None:
     assert together(shown)
     assert server.connections >= 2
     assert any("broke off" in str(warning.message) for warning in caught)
+
+
+@pytest.mark.parametrize(("others", "cameras"), [((), 2), (None, 3), ([(0, 1)], 3)])
+def test_of_other_cameras_only_those_that_are_asked_for_are_read(others: Any, cameras: int) -> None:
+    """The one that is not read never sends, so that waiting for it would fail."""
+    middle = {"away": range(10**6 if cameras == 2 else 0)}
+    numbers, _, _ = taken(1, {}, middle, {}, others=others)
+    assert len(numbers[0]) == cameras
+    assert together(numbers)
+
+
+def test_live_cameras_are_coded_with_a_layer(tmp_path: Path) -> None:
+    ports, out = [free_port() for _ in range(3)], tmp_path / "out.mcap"
+    addresses = [f"udp://127.0.0.1:{port}" for port in ports]
+    options = ["--grid", "1x3", "--disparity-range", "0,8", "--frames", "0:2", "--enhance", "24", "--quiet"]
+    start_s = time.monotonic()
+    with ExitStack() as stack:
+        for col, port in enumerate(ports):
+            stack.enter_context(Sender(port, col, start_s))
+        succeeds("encode", *addresses, out, *options, "--patience", "60")
+    assert validate(out) == []
+    with Decoder.open(out, enhanced=None) as decoder:
+        for decoded in decoder:
+            shown = decoded.enhanced[0, 1].pixels
+            number = number_of(shown)
+            assert np.abs(shown.astype(int) - numbered(number, 1)).mean() < 12
+            assert number_of(decoded.pictures[0, 0]) == number
 
 
 def test_a_silent_camera_is_named_after_a_while() -> None:

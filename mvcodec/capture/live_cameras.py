@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, pairwise, product
 from statistics import median
@@ -18,7 +18,7 @@ from mvcodec.capture.live_clock import SharedShifts
 from mvcodec.capture.pairing import NEAREST_SHARE
 from mvcodec.capture.reading import views_in_pictures
 from mvcodec.capture.recorded_calibration import RecordedCamera
-from mvcodec.capture.selection import real_cameras, select_real
+from mvcodec.capture.selection import read_views, real_cameras, select_real
 from mvcodec.capture.split import cut_out, view_size
 from mvcodec.capture.timing import nominal_fps, tolerance
 from mvcodec.capture.video_input import frame_to_rgb
@@ -46,6 +46,7 @@ class LiveSettings:
         calibration: of all cameras; None: nominal.
         clock: the senders' stamps, or arrival; None: stamps where they seem to be of one clock.
         offsets_ms: what is added to the times of an address.
+        others: views beside the real cameras whose pictures are read too, in every frame set; None: all.
 
     Raises:
         SettingError: the grid doesn't fit, or a number is out of range.
@@ -67,6 +68,7 @@ class LiveSettings:
         high=86_400,
     )
     split: tuple[int, int] = views_in_pictures((1, 1))
+    others: Collection[Position] | None = ()
 
     def __post_init__(self) -> None:
         (rows, cols), (down, across) = self.grid, self.split
@@ -101,13 +103,12 @@ class LiveCameras:
         self._settings = settings
         addresses = settings.addresses
         self.name = addresses[0] if len(addresses) == 1 else f"{addresses[0]} ... {addresses[-1]}"
-        self._axes = select_real(settings.real, *settings.grid)
+        self._views = read_views(settings.real, settings.grid, settings.others)
         (down, across), cols = settings.split, settings.grid[1] // settings.split[1]
         self._changed = threading.Condition()
         self._cameras = {
             (row, col): LiveCamera(addresses[row * cols + col], self._changed, settings.patience_s)
-            for row in dict.fromkeys(row // down for row in self._axes[0])
-            for col in dict.fromkeys(col // across for col in self._axes[1])
+            for row, col in sorted({(row // down, col // across) for row, col in self._views})
         }
         self._shifts = SharedShifts(settings.clock)
         self._senders = {position: number for number, position in enumerate(self._cameras)}
@@ -139,7 +140,7 @@ class LiveCameras:
     def frame_sets(self) -> Iterator[FrameSet]:
         """Frame sets as they come, numbered from 0, until nothing comes any more."""
         assert self._first is not None
-        (down, across), real = self._settings.split, set(self.array.real)
+        down, across = self._settings.split
         width, height = self.array.width, self.array.height
         size = (down * height, across * width, 3)
         for index, (time_ns, pictures) in enumerate(chain([self._first], self._sets)):
@@ -154,7 +155,7 @@ class LiveCameras:
                 for (row, col), picture in pictures.items()
                 for inner_row, inner_col in product(range(down), range(across))
             }
-            yield FrameSet(index, time_ns, {place: views[place] for place in sorted(views) if place in real})
+            yield FrameSet(index, time_ns, {place: views[place] for place in sorted(self._views)})
         left_out = sum(camera.left_out for camera in self._cameras.values())
         self._warn(f"nothing came for {self._settings.patience_s:g} s: taken as the end")
         if left_out or self._dropped:
@@ -182,6 +183,7 @@ class LiveCameras:
 
     def _make_array(self, pictures: Mapping[Position, Picture]) -> CameraArray:
         rows, cols = self._settings.grid
+        real_rows, real_cols = select_real(self._settings.real, rows, cols)
         height, width = next(iter(pictures.values())).shape[:2]
         width, height = view_size((width, height), *self._settings.split, self.name)
         return CameraArray(
@@ -190,8 +192,8 @@ class LiveCameras:
             width=width,
             height=height,
             fps=self._settings.fps or round(1e9 / self._step_ns, 3),
-            real_rows=self._axes[0],
-            real_cols=self._axes[1],
+            real_rows=real_rows,
+            real_cols=real_cols,
             calibration=self._settings.calibration or Calibration.nominal(width, height),
             name=self.name,
         )

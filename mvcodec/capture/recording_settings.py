@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
-from itertools import chain, product
+from itertools import chain
 from typing import get_args
 
 from mvcodec.array import Calibration, Position
 from mvcodec.capture.reading import used_bits, views_in_pictures
-from mvcodec.capture.selection import real_cameras, select_real
+from mvcodec.capture.selection import read_views, real_cameras
 from mvcodec.capture.time_gaps import Gaps, gaps_field
 from mvcodec.capture.timing import nominal_fps, tolerance
 from mvcodec.container.recorded_pictures import Clock
@@ -85,10 +85,7 @@ class RecordingSettings:
         Raises:
             SettingError: `real` doesn't fit the grid.
         """
-        rows, cols = self.grid
-        every = set(product(range(rows), range(cols)))
-        real = product(*select_real(self.real, rows, cols))
-        return frozenset(every if self.others is None else {*real, *every.intersection(self.others)})
+        return read_views(self.real, self.grid, self.others)
 
     def read_topics(self) -> dict[str, Position]:
         """The topics with such views in their pictures, each with its place in `topics`.

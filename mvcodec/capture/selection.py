@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from itertools import product
 from typing import Any
 
-from mvcodec.array import legal_steps
+from mvcodec.array import Position, legal_steps
 from mvcodec.errors import SettingError
 from mvcodec.settings import setting
 
@@ -47,6 +49,17 @@ def select_real(text: str, rows: int, cols: int) -> RealAxes:
     if chosen_rows not in _choices(rows) or chosen_cols not in _choices(cols):
         raise _refusal(text, rows, cols)
     return chosen_rows, chosen_cols
+
+
+def read_views(real: str, grid: tuple[int, int], others: Collection[Position] | None) -> frozenset[Position]:
+    """The views whose pictures are read: the real cameras, and of `others` those in the grid (None: all).
+
+    Raises:
+        SettingError: `real` doesn't fit the grid.
+    """
+    every = set(product(range(grid[0]), range(grid[1])))
+    cameras = product(*select_real(real, *grid))
+    return frozenset(every if others is None else {*cameras, *every.intersection(others)})
 
 
 def _axis(count: int, step: int) -> tuple[int, ...]:

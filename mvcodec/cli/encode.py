@@ -146,8 +146,6 @@ def _check_effect(arguments: argparse.Namespace) -> None:
         refuse_stream_options(arguments)
     elif arguments.target_psnr is not None:
         raise SettingError("--target-psnr", "with a recording or a stream", "an array folder or videos")
-    elif arguments.enhance is not None and is_live(arguments):
-        raise SettingError("--enhance", "with live cameras", "an array folder, videos or a recording")
     elif arguments.dry_run or arguments.continues:
         option = "--dry-run" if arguments.dry_run else "--continues"
         raise SettingError(option, "with a recording or a stream", "an array folder or videos")

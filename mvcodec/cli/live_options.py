@@ -67,6 +67,7 @@ def live_cameras(arguments: argparse.Namespace) -> Iterator[LiveCameras]:
         clock=arguments.clock,
         offsets_ms=timing.offsets_ms,
         split=split,
+        others=() if arguments.enhance is None else arguments.enhance_views,
         **patience,
     )
     with closing(LiveCameras(settings)) as cameras:
