@@ -94,6 +94,8 @@ def fetch_early(builder: Any, array: Any, index: Any, element: Any) -> None:
 
 def rounds(builder: Any, apart: Lanes, among: Lanes, work: Any) -> None:
     """Write a loop over the distinct values of `apart` in the lanes `among`: ``work(value, which lanes)``."""
+    # Nothing but the offsets tells lanes apart in the loop: LLVM makes a vector of bits one bit after the other.
+    apart = apart.where(among, NOWHERE)
     offsets = cgutils.alloca_once(builder, apart.value.type)
     builder.store(apart.value, offsets)
     left = cgutils.alloca_once_value(builder, among.bits())
@@ -105,7 +107,7 @@ def rounds(builder: Any, apart: Lanes, among: Lanes, work: Any) -> None:
     builder.position_at_end(body)
     first = builder.zext(lowest_bit(builder, now), WORD)
     offset = builder.load(builder.gep(builder.bitcast(offsets, WORD.as_pointer()), [first]))
-    lanes = Lanes(builder, builder.bitcast(now, among.value.type)) & apart.is_("==", filled(builder, offset))
+    lanes = apart.is_("==", filled(builder, offset))
     builder.store(builder.and_(now, builder.not_(lanes.bits())), left)
     work(offset, lanes)
     builder.branch(head)
