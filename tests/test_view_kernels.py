@@ -172,14 +172,16 @@ def planes_of(sources: list[twins.Source], tolerance: float) -> Planes:
 def check_blend(rng: np.random.Generator, shape: Shape, count: int, chosen: LayeredSettings) -> Mask:
     """Compare on random input; returns which pixels some camera sees."""
     maps = smoother(some_maps(rng, count + 1, shape), rng)
+    # Cameras beside a view and above it have kernels of their own: a third of all shifts is 0.
+    shifts = rng.integers(-8, 9, (count, 2)) * (rng.random((count, 2)) < 2 / 3) / 8
     sources = [
         twins.Source(
             rng.integers(0, 256, (*shape, 3), dtype=np.uint8),
             disparity,
-            (float(rng.integers(-8, 9) / 8), float(rng.integers(-8, 9) / 8)),
+            (float(right), float(down)),
             float(rng.integers(1, 17) / 16),
         )
-        for disparity in maps[1:]
+        for disparity, (right, down) in zip(maps[1:], shifts, strict=True)
     ]
     view, tolerance = maps[0], chosen.tolerance_px
     pixels = np.full((*shape, 3), 77, np.uint8)

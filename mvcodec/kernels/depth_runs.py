@@ -39,19 +39,15 @@ def _move_run(_typing, disparity, out, x, y, width, height, shift_x, shift_y, sp
         lanes = constant(builder, FLOAT, range(COUNT))
         spill = filled(builder, spill)
 
-        one = constant(builder, WORD, [1] * COUNT)
-
         def along(first, shift, length):  # type: ignore[no-untyped-def]
-            """The nearest pixel, 0 in the border, and which neighbour is covered too: -1, 1, 0 for none."""
+            """The nearest pixel, 0 in the border, and how far beyond its middle the place lies."""
             target = first - filled(builder, shift) * d
             target = target.within(-1.0, filled(builder, builder.sitofp(length, FLOAT)))
             pixel = (target + 1.5).to_words()
-            part = target + 1.0 - pixel.to_floats()
-            return pixel, one.where(part.is_(">=", spill)) - one.where((part * -1.0).is_(">=", spill))
+            return pixel, target + 1.0 - pixel.to_floats()
 
-        column, beside = along(filled(builder, builder.sitofp(x, FLOAT)) + lanes, shift_x, width)
-        row, above = along(filled(builder, builder.sitofp(y, FLOAT)), shift_y, height)
-        above_by = above * filled(builder, stride)
+        column, right = along(filled(builder, builder.sitofp(x, FLOAT)) + lanes, shift_x, width)
+        row, down = along(filled(builder, builder.sitofp(y, FLOAT)), shift_y, height)
         apart = row * filled(builder, stride) + column + COUNT - 1 - constant(builder, WORD, range(COUNT))
 
         def work(offset, lanes):  # type: ignore[no-untyped-def]
@@ -64,9 +60,17 @@ def _move_run(_typing, disparity, out, x, y, width, height, shift_x, shift_y, sp
                 builder.icmp_unsigned("!=", lanes.bits(), ir.Constant(ir.IntType(COUNT), 0))
             )
 
+        one = constant(builder, WORD, [1] * COUNT)
+
+        def covered_too(part):  # type: ignore[no-untyped-def]
+            """Which neighbour is: -1, 1, 0 for none."""
+            return one.where(part.is_(">=", spill)) - one.where((part * -1.0).is_(">=", spill))
+
         rounds(builder, apart, known, work)
-        aside, over = beside.is_("!=", 0) & known, above.is_("!=", 0) & known
-        with some(aside | over):
+        with some(right.size().most(down.size()).is_(">=", spill)):  # one test: most pixels cover one place
+            beside, above = covered_too(right), covered_too(down)
+            aside, over = beside.is_("!=", 0) & known, above.is_("!=", 0) & known
+            above_by = above * filled(builder, stride)
             for moved, also in ((beside, aside), (above_by, over), (beside + above_by, aside & over)):
                 with some(also):
                     rounds(builder, apart + moved, also, work)

@@ -86,6 +86,14 @@ class Lanes:
         called = self.builder.call(function, [self.value, other.value], fastmath=("nnan", "nsz"))
         return Lanes(self.builder, called)
 
+    def size(self) -> Lanes:
+        """Float32 without their signs."""
+        kind = self.value.type
+        function = cgutils.get_or_insert_function(
+            self.builder.module, ir.FunctionType(kind, [kind]), f"llvm.fabs.v{kind.count}f32"
+        )
+        return Lanes(self.builder, self.builder.call(function, [self.value]))
+
     def within(self, low: Any, high: Any) -> Lanes:
         """Kept within low..high; what is not a number becomes low."""
         above = self.where(self.is_(">", low), low)

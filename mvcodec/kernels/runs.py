@@ -94,7 +94,7 @@ def fetch_early(builder: Any, array: Any, index: Any, element: Any) -> None:
 
 def rounds(builder: Any, apart: Lanes, among: Lanes, work: Any) -> None:
     """Write a loop over the distinct values of `apart` in the lanes `among`: ``work(value, which lanes)``."""
-    # Nothing but the offsets tells lanes apart in the loop: LLVM makes a vector of bits one bit after the other.
+    # In the loop the offsets alone tell lanes apart: of bits LLVM makes a vector one bit after the other.
     apart = apart.where(among, NOWHERE)
     offsets = cgutils.alloca_once(builder, apart.value.type)
     builder.store(apart.value, offsets)

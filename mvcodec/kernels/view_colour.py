@@ -17,7 +17,14 @@ from mvcodec.kernels.lanes import COUNT
 from mvcodec.kernels.runs import PLACES, marked
 from mvcodec.kernels.view_fetch import BORDER, CONTOUR, corner_of, distinct, phase_of, place_of
 from mvcodec.kernels.view_marks import list_bits
-from mvcodec.kernels.view_runs import add_run, place_columns, place_rows, store_run
+from mvcodec.kernels.view_runs import (
+    add_run,
+    add_run_above,
+    add_run_beside,
+    place_columns,
+    place_rows,
+    store_run,
+)
 from mvcodec.kernels.view_vectors import ONE, add_edge, add_fetched
 
 FloatMap = NDArray[np.float32]
@@ -249,23 +256,23 @@ def blend(
                     whole_sharpness,
                 )
             for i in range(cameras.size):
-                found = add_run(
-                    pairs,
-                    colour,
-                    fetchable,
-                    disparity,
-                    columns,
-                    rows,
-                    sums,
-                    seen,
-                    cameras[i] * plane + BORDER * stride + BORDER,
-                    stride,
-                    x,
-                    PLACES * column_of[i],
-                    PLACES * row_of[i],
-                    weights[i],
-                    near_px,
-                )
+                start = cameras[i] * plane + BORDER * stride + BORDER
+                column, row = PLACES * column_of[i], PLACES * row_of[i]
+                if shifts[i, 1] == 0:
+                    found = add_run_beside(
+                        pairs, colour, fetchable, disparity, columns, rows, sums, seen,
+                        start, stride, x, column, row, weights[i], near_px,
+                    )  # fmt: skip
+                elif shifts[i, 0] == 0:
+                    found = add_run_above(
+                        pairs, colour, fetchable, disparity, columns, rows, sums, seen,
+                        start, stride, x, column, row, weights[i], near_px,
+                    )  # fmt: skip
+                else:
+                    found = add_run(
+                        pairs, colour, fetchable, disparity, columns, rows, sums, seen,
+                        start, stride, x, column, row, weights[i], near_px,
+                    )  # fmt: skip
                 edge_counts[i] = list_bits(found, x, edges[i], edge_counts[i])
                 bits |= found
             touched_count = list_bits(bits, x, touched, touched_count)
