@@ -9,7 +9,7 @@ from stereo_scene import Planes, linear_or_grid
 from mvcodec.array import Position
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.stereo.joint_settings import BALANCED, JointSettings
-from mvcodec.stereo.matcher import SelectiveMatcher
+from mvcodec.stereo.matcher import HalvingMatcher, SelectiveMatcher
 from mvcodec.stereo.realtime import Realtime
 
 RANGE_PX = (0.0, 24.0)
@@ -54,6 +54,30 @@ def test_a_camera_is_matched_alone_as_among_others() -> None:
     for camera in two:
         np.testing.assert_array_equal(some[camera].values_px, every[camera].values_px)
         np.testing.assert_array_equal(some[camera].valid, every[camera].valid)
+
+
+@pytest.mark.parametrize("halvings", [1, 2])
+def test_maps_of_half_size_are_there_before_those_of_full_size(halvings: int) -> None:
+    array = linear_or_grid(2, 2, 150, 101)
+    scene, wanted = Planes(array, 4, 16), [(0, 0), (1, 1)]
+    matcher = Realtime(most_px=(0,) * halvings)
+    assert isinstance(matcher, HalvingMatcher)
+    maps = matcher.match_halved(array, scene.pictures(), RANGE_PX, wanted, fresh=True)
+    assert maps is not None
+    assert list(maps) == wanted
+    for camera, found in maps.items():
+        assert found.values_px.shape == found.valid.shape == (51, 75)
+        assert found.values_px.dtype == np.float32
+        there = scene.disparity_px(camera)[::2, ::2]
+        assert np.mean(np.abs(found.values_px - there) > 1.5) < (0.08, 0.15)[halvings - 1]
+
+
+@pytest.mark.parametrize(
+    "matcher", [Realtime(), Realtime(JointSettings(**BALANCED), most_px=(0,))], ids=["whole", "refined"]
+)
+def test_there_are_none_where_whole_pictures_have_a_say(matcher: Realtime) -> None:
+    array = linear_or_grid(2, 2, 60, 40)
+    assert matcher.match_halved(array, Planes(array, 4, 16).pictures(), RANGE_PX, [(0, 0)], True) is None
 
 
 def test_balanced_maps_confirm_each_other_whatever_is_asked_for() -> None:

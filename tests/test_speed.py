@@ -12,6 +12,7 @@ from stereo_scene import Planes, linear_or_grid
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.container import read_info
+from mvcodec.decoding.decoder import Decoder
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.speed_choice import SPEEDS
 from mvcodec.errors import SettingError
@@ -91,6 +92,38 @@ def test_only_cameras_that_send_something_are_matched(
     with Encoder(array, config) as encoder:
         encoder.push(frames)
     assert matcher.cameras == expected
+
+
+class Halving(Asked):
+    """A HalvingMatcher: its maps of half size and of full size differ."""
+
+    def match_halved(
+        self,
+        array: CameraArray,
+        pictures: Mapping[Position, Picture],
+        range_px: tuple[float, float],
+        cameras: Sequence[Position],
+        fresh: bool,
+    ) -> dict[Position, DisparityMap] | None:
+        del pictures, fresh
+        shape = -(-array.height // 2), -(-array.width // 2)
+        flat = DisparityMap(np.full(shape, range_px[1], np.float32), np.ones(shape, np.bool_))
+        return dict.fromkeys(cameras, flat)
+
+
+@pytest.mark.parametrize(("scale", "depth", "expected_px"), [(2, False, 10), (1, False, 0), (2, True, 0)])
+def test_maps_that_are_coded_at_half_size_are_asked_for_so(
+    scale: int, depth: bool, expected_px: float
+) -> None:
+    array, matcher = linear_or_grid(1, 2, 65, 51), Halving()
+    config = EncoderConfig(
+        matcher=matcher, disparity_range_px=(0.0, 10.0), disparity_scale=scale, depth=depth, preset="veryfast"
+    )
+    with Encoder(array, config) as encoder, Decoder() as decoder:
+        packets = encoder.push(FrameSet(0, 0, Planes(array, 2, 8).pictures()))
+        (decoded,) = [found for packet in packets for found in decoder.push(packet)]
+    for camera in array.real:
+        np.testing.assert_allclose(decoded.disparities[camera].values_px, expected_px, atol=0.1)
 
 
 def test_at_keyframes_a_matcher_forgets() -> None:

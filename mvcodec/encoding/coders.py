@@ -81,7 +81,7 @@ class Coders:
         """Code one frame set.
 
         Args:
-            match: gives the maps; pictures are coded meanwhile.
+            match: gives the maps, of the pictures' size or as they are coded; pictures are coded meanwhile.
 
         Returns:
             The header's packet at a keyframe, then one for each track, pictures first.
@@ -147,7 +147,9 @@ class Coders:
         header = self._header
         codes = quantise(disparity.values_px, header.disparity_range_px)
         median = self._config.median_for(header.array)
-        return self._code(track, grey_planes(to_coded(codes, header.disparity_scale, median)), keyframe)
+        is_whole = codes.shape == (header.array.height, header.array.width)
+        scale = header.disparity_scale if is_whole else 1  # a matcher's map of half size
+        return self._code(track, grey_planes(to_coded(codes, scale, median)), keyframe)
 
     def _code(self, track: Track, planes: Planes, keyframe: bool) -> list[CodedPicture]:
         return self._encoders[track].push(planes, keyframe)

@@ -19,7 +19,7 @@ from mvcodec.encoding.predicted_cameras import prediction_order
 from mvcodec.encoding.stream_rate import StreamRate
 from mvcodec.errors import InputError, SettingError, StreamClosed
 from mvcodec.frames import DisparityMap, FrameSet
-from mvcodec.stereo.matcher import FrameMatcher, Matcher, SelectiveMatcher
+from mvcodec.stereo.matcher import FrameMatcher, HalvingMatcher, Matcher, SelectiveMatcher
 from mvcodec.stream import (
     Packet,
     StreamHeader,
@@ -31,6 +31,7 @@ from mvcodec.video.codec import (
     RateControl,
 )
 from mvcodec.video.codecs import find_codec
+from mvcodec.video.map_size import small_size
 
 __all__ = ["Encoder", "EncoderConfig", "default_gop", "find_matcher"]
 
@@ -167,7 +168,7 @@ class Encoder:
         return self._coders
 
     def _match(self, frames: FrameSet, keyframe: bool) -> Mapping[Position, DisparityMap]:
-        """The maps that are sent; every camera's, where depth is."""
+        """The maps that are sent, of half size where the matcher has those; with depth, every camera's."""
         assert self._header is not None
         if not (self._header.map_cameras or self.config.depth):
             return {}
@@ -178,7 +179,13 @@ class Encoder:
             maps = self._matcher.match_frames(self.array, frames, range_px)
         elif isinstance(self._matcher, SelectiveMatcher) and not self.config.depth:
             cameras = self._header.map_cameras
-            maps = self._matcher.match_cameras(self.array, pictures, range_px, cameras, keyframe)
+            wanted = self.array, pictures, range_px, cameras, keyframe
+            if self._scale == 2 and isinstance(self._matcher, HalvingMatcher):
+                small = self._matcher.match_halved(*wanted)
+                if small is not None:
+                    self._maps = {camera: self._checked_map(small, camera, self._scale) for camera in cameras}
+                    return self._maps
+            maps = self._matcher.match_cameras(*wanted)
         else:
             cameras = self.array.real
             maps = self._matcher.match(self.array, pictures, range_px)
@@ -254,12 +261,14 @@ class Encoder:
             before = f"after frame {self._last.index} at {self._last.time_ns} ns"
             raise InputError(where, f"time {frames.time_ns} ns {before}", "frame sets in order of time")
 
-    def _checked_map(self, maps: Mapping[Position, DisparityMap], camera: Position) -> DisparityMap:
+    def _checked_map(
+        self, maps: Mapping[Position, DisparityMap], camera: Position, scale: int = 1
+    ) -> DisparityMap:
         name = f"{type(self._matcher).__name__}.match, view {view_name(camera)}"
         found = maps.get(camera)
         if found is None:
             raise InputError(name, "no map", "one of every real camera")
-        shape = (self.array.height, self.array.width)
+        shape = small_size(self.array.width, self.array.height, scale)[::-1]
         if found.values_px.shape != shape:
             raise InputError(name, f"a map of shape {found.values_px.shape}", f"{shape}")
         if not np.isfinite(found.values_px).all():

@@ -53,6 +53,29 @@ class SelectiveMatcher(Protocol):
 
 
 @runtime_checkable
+class HalvingMatcher(Protocol):
+    """A Matcher that has maps of half size before it has those of full size."""
+
+    def match_halved(
+        self,
+        array: CameraArray,
+        pictures: Mapping[Position, Picture],
+        range_px: tuple[float, float],
+        cameras: Sequence[Position],
+        fresh: bool,
+    ) -> dict[Position, DisparityMap] | None:
+        """Disparity of some real cameras, for maps that are coded at half size.
+
+        The arguments are those of `SelectiveMatcher.match_cameras`.
+
+        Returns:
+            Maps of half the size, rounded up; sample (v, u) is that of the pixels 2v, 2v + 1 and 2u, 2u + 1,
+            in px of the whole pictures. None where this matcher has none of pictures of this size.
+        """
+        ...
+
+
+@runtime_checkable
 class FrameMatcher(Protocol):
     """A Matcher that looks at more of a frame set than its pictures."""
 

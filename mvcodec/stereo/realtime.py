@@ -29,7 +29,7 @@ COLOUR_STEP = 40.0
 
 
 class Realtime:
-    """The `realtime` matcher, a `SelectiveMatcher`."""
+    """The `realtime` matcher, a `SelectiveMatcher` and a `HalvingMatcher`."""
 
     def __init__(self, settings: JointSettings | None = None, most_px: tuple[int, ...] = MOST_PX) -> None:
         """Match at half the size where pictures have more than most_px[0] pixels, and so on."""
@@ -54,17 +54,35 @@ class Realtime:
         fresh: bool,
     ) -> dict[Position, DisparityMap]:
         """See `SelectiveMatcher.match_cameras`."""
-        halvings = sum(array.width * array.height > most for most in self._most_px)
+        halvings = self._halvings(array)
         # Without the check by their own costs, maps confirm each other, and all are needed.
         matched = cameras if self._joint.settings.self_check else array.real
         if halvings == 0:
             maps = self._unshrunk.maps_of(array, pictures, range_px, matched, fresh)
         else:
-            maps = self._match_halved(array, pictures, range_px, matched, fresh, halvings)
+            maps = self._match_shrunk(array, pictures, range_px, matched, fresh, halvings)
             maps = self._joint.refined(array, pictures, maps, range_px)
         return {camera: maps[camera] for camera in cameras}
 
-    def _match_halved(
+    def match_halved(
+        self,
+        array: CameraArray,
+        pictures: Mapping[Position, Picture],
+        range_px: tuple[float, float],
+        cameras: Sequence[Position],
+        fresh: bool,
+    ) -> dict[Position, DisparityMap] | None:
+        """See `HalvingMatcher.match_halved`. None too where maps are refined by the whole pictures."""
+        settings, halvings = self._joint.settings, self._halvings(array)
+        if halvings == 0 or settings.full_size_steps or not settings.self_check:
+            return None
+        maps, _ = self._small_maps(array, pictures, range_px, cameras, fresh, halvings)
+        return {camera: DisparityMap(found.values_px * 2, found.valid) for camera, found in maps.items()}
+
+    def _halvings(self, array: CameraArray) -> int:
+        return sum(array.width * array.height > most for most in self._most_px)
+
+    def _match_shrunk(
         self,
         array: CameraArray,
         pictures: Mapping[Position, Picture],
@@ -73,14 +91,27 @@ class Realtime:
         fresh: bool,
         halvings: int,
     ) -> dict[Position, DisparityMap]:
+        """Maps of these pictures, by copies that are halved so many times."""
         if halvings == 0:
             return self._joint.maps_of(array, pictures, range_px, cameras, fresh)
+        maps, shrunk = self._small_maps(array, pictures, range_px, cameras, fresh, halvings)
+        doubled = run_all(lambda camera: _doubled(maps[camera], pictures[camera], shrunk[camera]), cameras)
+        return dict(zip(cameras, doubled, strict=True))
+
+    def _small_maps(
+        self,
+        array: CameraArray,
+        pictures: Mapping[Position, Picture],
+        range_px: tuple[float, float],
+        cameras: Sequence[Position],
+        fresh: bool,
+        halvings: int,
+    ) -> tuple[dict[Position, DisparityMap], dict[Position, Picture]]:
+        """Maps of copies of half the size, in their px, and the copies."""
         small = replace(array, width=-(-array.width // 2), height=-(-array.height // 2))
         shrunk = dict(zip(pictures, run_all(_halved, pictures.values()), strict=True))
         span = range_px[0] / 2, range_px[1] / 2
-        maps = self._match_halved(small, shrunk, span, cameras, fresh, halvings - 1)
-        doubled = run_all(lambda camera: _doubled(maps[camera], pictures[camera], shrunk[camera]), cameras)
-        return dict(zip(cameras, doubled, strict=True))
+        return self._match_shrunk(small, shrunk, span, cameras, fresh, halvings - 1), shrunk
 
 
 def _halved(picture: Picture) -> Picture:
