@@ -25,7 +25,7 @@ from map_codings import whole_numbers
 
 from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, join_negative_values
-from mvcodec.cli.coding_options import find_range
+from mvcodec.cli.coding_options import find_range, with_keyframe_ratio
 from mvcodec.encoding.encoder import EncoderConfig, find_matcher
 from mvcodec.errors import MvCodecError
 from mvcodec.evaluation.bd import compare_curves, hull
@@ -75,6 +75,7 @@ def measure(arguments: argparse.Namespace) -> dict[str, list[CurvePoint]]:
     base = EncoderConfig(
         matcher=arguments.matcher, disparity_range_px=find_range(source, chosen, None), qp=arguments.qp[0]
     )
+    base = with_keyframe_ratio(source, chosen, base)
     with tempfile.TemporaryDirectory() as folder, MapSpool(Path(folder)) as spool:
         return {
             form: [

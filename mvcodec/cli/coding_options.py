@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from mvcodec.cli.arguments import (
 from mvcodec.cli.paths import local_path
 from mvcodec.cli.setting_options import add_setting
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
+from mvcodec.encoding.keyframe_ratio import STILL_RATIO, keyframe_ratio
 from mvcodec.encoding.speed_choice import FOR_FILES, FOR_LIVE
 from mvcodec.errors import SettingError
 from mvcodec.frames import FrameSet
@@ -28,6 +30,9 @@ from mvcodec.stereo.given import given_range
 
 APART_S = 0.5
 """Pictures nearer to each other in time tell the same of the range of disparities."""
+
+PAIR, MOST_PAIRS = 2, 3
+"""Pictures side by side that tell whether a camera and what it sees stand still; how many pairs are seen."""
 
 INSIST = "--exact-range keeps it as stated"
 
@@ -39,6 +44,7 @@ CODING = (
     "prediction",
     "disparity_median",
     "gop",
+    "keyframe_ratio",
     "matcher",
     "preset",
 )
@@ -81,6 +87,14 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
         help="take --disparity-range as it stands, whatever the pictures show",
     )
     add_setting(parser, EncoderConfig, "gop")
+    add_setting(
+        parser,
+        EncoderConfig,
+        "keyframe_ratio",
+        metavar="R",
+        left_open=True,
+        note=f" (default: {STILL_RATIO:g} for files of which most stands still, at a constant QP or CRF)",
+    )
     add_setting(
         parser,
         EncoderConfig,
@@ -139,6 +153,19 @@ def find_range(
         return given_range(samples)
     hint = None if option == "auto" else source.array.disparity_hint_px
     return estimate_range(source.array, samples, hint)
+
+
+def with_keyframe_ratio(source: ArraySource, chosen: range, config: EncoderConfig) -> EncoderConfig:
+    """The settings with the ratio that the pictures of the first real camera ask for, where none is given."""
+    given = config.keyframe_ratio is not None or config.codec != "h264" or config.quality is None
+    if given or len(chosen) < PAIR:
+        return config
+    pairs = max(min(MOST_PAIRS, len(chosen) // PAIR), 1)
+    starts = [chosen.start + place * (len(chosen) - PAIR) // max(pairs - 1, 1) for place in range(pairs)]
+    camera = source.array.real[0]
+    seen = (source.frame_sets(slice(start, start + PAIR), [camera]) for start in starts)
+    pictures = ([frames.pictures[camera] for frames in pair] for pair in seen)
+    return replace(config, keyframe_ratio=keyframe_ratio(pair for pair in pictures if len(pair) == PAIR))
 
 
 def _samples(source: ArraySource, chosen: range, first: FrameSet | None) -> list[FrameSet]:

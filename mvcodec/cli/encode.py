@@ -16,7 +16,14 @@ from mvcodec.capture.manifest import read_calibration
 from mvcodec.capture.recording_files import recording_files
 from mvcodec.capture.selection import CORNERS
 from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, add_output_options
-from mvcodec.cli.coding_options import add_coding, add_input, check_exact_range, checked_config, find_range
+from mvcodec.cli.coding_options import (
+    add_coding,
+    add_input,
+    check_exact_range,
+    checked_config,
+    find_range,
+    with_keyframe_ratio,
+)
 from mvcodec.cli.encode_stream import (
     GIVEN,
     Unfinished,
@@ -184,6 +191,7 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
                 exact=arguments.exact_range,
                 first=first,
             )
+    config = with_keyframe_ratio(source, chosen, config)
     del first  # its memory is as large as what is coded next
     if arguments.dry_run:
         print(plan(array, config, chosen, range_px))

@@ -10,11 +10,17 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mvcodec.array import CameraArray
-from mvcodec.capture import open_input, resolve_frames
+from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.cli.arguments import add_frames, add_output_options, add_synthesizer, codec_name, positive_int
 from mvcodec.cli.cluster_options import add_cluster, place
-from mvcodec.cli.coding_options import add_coding, add_input, check_exact_range, checked_config, find_range
+from mvcodec.cli.coding_options import (
+    add_coding,
+    add_input,
+    check_exact_range,
+    checked_config,
+    find_range,
+    with_keyframe_ratio,
+)
 from mvcodec.cli.layer_options import add_layer, layer_settings
 from mvcodec.cli.paths import check_folder_target
 from mvcodec.cli.progress import progress
@@ -101,7 +107,7 @@ def _evaluate(arguments: argparse.Namespace, stack: ExitStack) -> None:
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     check_exact_range(arguments)
     range_px = find_range(source, chosen, arguments.disparity_range_px, exact=arguments.exact_range)
-    study = _study(source.array, arguments, range_px)
+    study = _study(source, chosen, arguments, range_px)
     facts = examine(source, chosen)
     store = PointStore(output / POINTS)
     with progress("evaluate", None, quiet=arguments.quiet, unit="picture") as bar:
@@ -159,12 +165,16 @@ def table(document: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _study(array: CameraArray, arguments: argparse.Namespace, range_px: tuple[float, float]) -> Study:
+def _study(
+    source: ArraySource, chosen: range, arguments: argparse.Namespace, range_px: tuple[float, float]
+) -> Study:
     from mvcodec.evaluation.anchors import ANCHORS
     from mvcodec.evaluation.study import Study, translate_qps
 
     make_synthesizer(arguments.synthesizer)  # a wrong name is told before anything is measured
-    config = checked_config(array, arguments, disparity_range_px=range_px, **layer_settings(arguments))
+    layer = layer_settings(arguments)
+    config = checked_config(source.array, arguments, disparity_range_px=range_px, **layer)
+    config = with_keyframe_ratio(source, chosen, config)
     return Study(
         qps=arguments.qp or translate_qps(DEFAULT_QPS, "h264", arguments.codec),
         config=config,

@@ -46,5 +46,6 @@ def plan(array: CameraArray, config: EncoderConfig, chosen: range, range_px: tup
             "cameras": len(array.real),
             "size": [array.width, array.height],
             "disparity_range_px": list(range_px),
+            "keyframe_ratio": config.keyframe_ratio,
         }
     )

@@ -203,17 +203,19 @@ class _Run:
         frames = range(*plan["frames"])
         self._progress.more(len(frames))
         low, high = plan["disparity_range_px"]
+        found = plan["keyframe_ratio"]
+        ratio = [] if found is None else [f"--keyframe-ratio={found!r}"]
         others = [
             option
             for option in self._batch.options
-            if option[0] not in ("--frames", "--disparity-range", "--exact-range")
+            if option[0] not in ("--frames", "--disparity-range", "--exact-range", "--keyframe-ratio")
         ]
         segments = cut(frames, plan["gop"], plan["fps"], self._batch.segment_s)
         # All are waited for before the first is looked at: one that is there already must not end the job.
         job.waiting = len(segments)
         for segment in segments:
             own = [f"--frames={segment.start}:{segment.stop}"]
-            own += [f"--disparity-range={low!r},{high!r}", "--exact-range"]
+            own += [f"--disparity-range={low!r},{high!r}", "--exact-range", *ratio]
             if segment.start > frames.start:
                 own.append(f"--continues={segment.start - frames.start}")
             part = self._segments(job) / f"{segment.start:08d}-{segment.stop:08d}.mcap"

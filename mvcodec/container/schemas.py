@@ -11,7 +11,8 @@ from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from google.protobuf.message import DecodeError
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.message import DecodeError, Message
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap_protobuf.schema import build_file_descriptor_set
 
@@ -63,9 +64,17 @@ PREDICTED_FORMAT = "vp9-predicted"
 """What messages of predicted pictures call their codec: no viewer knows it, and none tries to play them."""
 
 
+def _descriptors(message: type[Message]) -> FileDescriptorSet:
+    """What a message's schema has to say, without what steers generators of code: a file holds it twice."""
+    files: FileDescriptorSet = build_file_descriptor_set(message)
+    for file in files.file:
+        file.ClearField("options")
+    return files
+
+
 def _predicted_schema() -> tuple[str, bytes]:
     """`mvcodec.PredictedVideo`: the fields of foxglove.CompressedVideo under a name of its own."""
-    files = build_file_descriptor_set(CompressedVideo)
+    files = _descriptors(CompressedVideo)
     for file in files.file:
         if file.name == CompressedVideo.DESCRIPTOR.file.name:
             file.name, file.package = "mvcodec/PredictedVideo.proto", "mvcodec"
@@ -74,7 +83,7 @@ def _predicted_schema() -> tuple[str, bytes]:
 
 
 PROTOBUF_SCHEMAS: dict[str, tuple[str, bytes]] = {
-    kind: (message.DESCRIPTOR.full_name, build_file_descriptor_set(message).SerializeToString())
+    kind: (message.DESCRIPTOR.full_name, _descriptors(message).SerializeToString())
     for kind, message in (
         ("video", CompressedVideo),
         ("calibration", CameraCalibration),
@@ -86,7 +95,7 @@ PROTOBUF_SCHEMAS: dict[str, tuple[str, bytes]] = {
 
 DEPTH_SCHEMA = (
     RawImage.DESCRIPTOR.full_name,
-    build_file_descriptor_set(RawImage).SerializeToString(),
+    _descriptors(RawImage).SerializeToString(),
 )
 """The same of depth, which few files have."""
 

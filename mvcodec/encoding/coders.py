@@ -129,6 +129,7 @@ class Coders:
     def _make(
         self, kind: TrackKind, cameras: tuple[Position, ...], size: tuple[int, int], rate: RateControl
     ) -> dict[Track, VideoEncoder]:
+        pictures = kind is TrackKind.TEXTURE
         settings = VideoSettings(
             kind,
             *size,
@@ -137,6 +138,7 @@ class Coders:
             rate,
             self._config.chosen_preset,
             coded_before=self._coded_before,
+            keyframe_ratio=self._config.keyframe_ratio if pictures else None,
         )
         return {Track(kind, camera): self._codec.encoder(settings) for camera in cameras}
 

@@ -38,6 +38,9 @@ LAYER_SLOPE, MOST_LAYER_OFFSET = 2.5, 6.0
 """What the layer's QP is more than the pictures', on libx264's scale: LAYER_SLOPE for each doubling of the
 views that build on a real camera, within what was measured; fitted in `docs/prediction.md`."""
 
+RATIO_CODECS = ("h264", "hevc")
+"""Codecs that can be told how much finer keyframes shall be."""
+
 DEFAULT_RATE = RateControl(qp=27)
 
 
@@ -80,6 +83,13 @@ class EncoderConfig:
         None,
         f"effort of the video encoder (default: what `speed` has; {FOR_FILES}: {SPEEDS[FOR_FILES].preset})",
         choices=PRESETS,
+    )
+    keyframe_ratio: float | None = setting(
+        None,
+        "how many times coarser other pictures are quantised than keyframes (h264, hevc; default: as the"
+        " codec has it, about 1.4)",
+        low=1,
+        high=4,
     )
     disparity_range_px: tuple[float, float] | None = setting(
         None,
@@ -150,6 +160,8 @@ class EncoderConfig:
         check_qp("enhance", None if isinstance(self.enhance, str) else self.enhance, max_qp)
         self.rate.check_scale(max_qp)
         check_settings(self)
+        if self.keyframe_ratio is not None and self.codec not in RATIO_CODECS:
+            raise SettingError("keyframe_ratio", self.keyframe_ratio, f"none beside codec {self.codec}")
         for name in ("enhance_views", "enhance_chain"):
             if getattr(self, name) is not None and self.enhance is None:
                 raise SettingError(name, "given", "enhance beside it")

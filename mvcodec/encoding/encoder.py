@@ -233,6 +233,7 @@ class Encoder:
             "disparity_median": None if maps is None else self._median,
             "prediction": config.prediction if self._order else None,
             "gop": self._gop,
+            "keyframe_ratio": config.keyframe_ratio,
             "speed": config.speed,
             "preset": config.chosen_preset,
             "matcher": matcher_name(config.chosen_matcher),

@@ -96,6 +96,7 @@ def code_array(
     rate: RateControl,
     gop: int,
     preset: str = "medium",
+    keyframe_ratio: float | None = None,
     threads: int | None = None,
     on_picture: Callable[[], object] | None = None,
 ) -> CodedArray:
@@ -108,7 +109,8 @@ def code_array(
 
     Args:
         codec: a name of `CODECS`; rate is on its scale.
-        rate, gop, preset: as the compared encoding uses them for pictures; gop in frame sets.
+        rate, gop, preset, keyframe_ratio: as the compared encoding uses them for pictures; gop in frame
+            sets.
         threads: sequences coded side by side; by default as set for the process.
         on_picture: called, from any thread, after each picture that was coded or measured: twice
             for each picture.
@@ -120,7 +122,15 @@ def code_array(
     chosen = resolve_frames(frames, source.frame_count, source.name)
     meter = QualityMeter(source.array.real)
     job = _Job(source, chosen, find_codec(codec), meter, on_picture or (lambda: None))
-    settings = partial(sequence_settings, source.array, anchor, rate=rate, gop=gop, preset=preset)
+    settings = partial(
+        sequence_settings,
+        source.array,
+        anchor,
+        rate=rate,
+        gop=gop,
+        preset=preset,
+        keyframe_ratio=keyframe_ratio,
+    )
     with workers.threads(threads):
         costs = workers.run_all(lambda tour: job.code(tour, settings(tour)), anchor.tours(source.array))
     return CodedArray(
@@ -133,14 +143,29 @@ def code_array(
 
 
 def sequence_settings(
-    array: CameraArray, anchor: Anchor, tour: Tour, *, rate: RateControl, gop: int, preset: str
+    array: CameraArray,
+    anchor: Anchor,
+    tour: Tour,
+    *,
+    rate: RateControl,
+    gop: int,
+    preset: str,
+    keyframe_ratio: float | None = None,
 ) -> VideoSettings:
     """The settings of one sequence's encoder; one keyframe at each time that mvcodec has them."""
     width, height = even_size(array.width, array.height)
     pictures = gop * len(tour)
     low_delay = not anchor.b_pictures
     return VideoSettings(
-        TrackKind.TEXTURE, width, height, array.fps, pictures, rate, preset, low_delay=low_delay
+        TrackKind.TEXTURE,
+        width,
+        height,
+        array.fps,
+        pictures,
+        rate,
+        preset,
+        low_delay=low_delay,
+        keyframe_ratio=keyframe_ratio,
     )
 
 

@@ -221,6 +221,7 @@ class StudyRun:
                 rate=RateControl(qp=qp),
                 gop=self.gop,
                 preset=self.study.config.chosen_preset,
+                keyframe_ratio=self.study.config.keyframe_ratio,
             )
         )
         return {"codec": curve.codec, "gop": self.gop, **settings}
@@ -305,6 +306,7 @@ class StudyRun:
             rate=RateControl(qp=qp),
             gop=self.gop,
             preset=self.study.config.chosen_preset,
+            keyframe_ratio=self.study.config.keyframe_ratio,
             threads=1,
             on_picture=self._go_on,
         )

@@ -138,6 +138,8 @@ class VideoSettings:
         rate: bits or quality.
         preset: effort, one of PRESETS.
         low_delay: each picture comes out at once; else the preset's own B-pictures and look-ahead.
+        keyframe_ratio: how many times coarser other pictures' quantiser steps are than keyframes'; None: as
+            the codec has it. Codecs without such a setting leave it be.
         coded_before: pictures of the same track that another encoder codes before: where the codec can,
             at a constant quantiser, this one's access units are those that one encoder for all would give.
     """
@@ -151,6 +153,7 @@ class VideoSettings:
     preset: str
     low_delay: bool = True
     coded_before: int = 0
+    keyframe_ratio: float | None = None
 
     def __post_init__(self) -> None:
         check_preset(self.preset)

@@ -20,9 +20,10 @@ def x26x_options(library: str, settings: VideoSettings, at_once: str, always: st
     """
     settings.rate.check_scale(MAX_QP)
     delay = f"{at_once}:" if settings.low_delay else ""
+    ratio = "" if settings.keyframe_ratio is None else f":ipratio={settings.keyframe_ratio:g}"
     return {
         "preset": settings.preset,
         "forced-idr": "1",
-        f"{library}-params": f"{delay}keyint={settings.gop}:{always}",
+        f"{library}-params": f"{delay}keyint={settings.gop}:{always}{ratio}",
         **settings.rate.options(),
     }
