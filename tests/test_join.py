@@ -17,7 +17,7 @@ from mvcodec.container import McapReader, McapWriter, read_info
 from mvcodec.container.declared import DROPPED_KEY
 from mvcodec.container.joining import join
 from mvcodec.encoding.encoder import Encoder
-from mvcodec.encoding.keyframe_ratio import MOVING_RATIO
+from mvcodec.encoding.keyframe_ratio import STILL_RATIO
 from mvcodec.errors import StreamError
 from mvcodec.stream import Packet
 
@@ -114,6 +114,6 @@ def test_dry_run_says_what_would_be_coded(tmp_path: Path) -> None:
     )
     low, high = plan.pop("disparity_range_px")
     assert low < high
-    assert plan.pop("keyframe_ratio") == MOVING_RATIO
+    assert plan.pop("keyframe_ratio") == STILL_RATIO
     assert plan == {"frames": [2, 12], "fps": 10.0, "gop": 5, "cameras": 2, "size": [96, 64]}
     assert not (tmp_path / "x.mcap").exists()
