@@ -102,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
     write_png(out / "contact_sheet.png", sheet(source.array, shown))
     for path in filter(None, (out / "original_synthesised_error.png", arguments.picture)):
         write_compared_view(source.array, shown, path)
-    anchor = code_anchor(source, arguments.qp)
+    anchor = code_anchor(source, arguments.qp, info.header.settings.get("keyframe_ratio"))
     print(table(info, quality, anchor, arguments.qp))
     print("\nIn " + str(out) + ": " + ", ".join(sorted(path.name for path in out.iterdir())))
     print("\nNext, look around in it, and make a film of a moving viewpoint:\n")
@@ -223,7 +223,7 @@ def write_compared_view(array: CameraArray, shown: Shown, path: Path) -> None:
     write_png(path, error_picture(shown.originals.pictures[view], shown.pictures[view]))
 
 
-def code_anchor(source: ArraySource, qp: int) -> CodedArray:
+def code_anchor(source: ArraySource, qp: int, keyframe_ratio: float | None) -> CodedArray:
     """The full array as simulcast H.264."""
     count = 2 * source.frame_count * len(source.array.positions)  # each is coded and measured
     print(f"coding all {len(source.array.positions)} views as simulcast H.264", flush=True)
@@ -233,6 +233,7 @@ def code_anchor(source: ArraySource, qp: int) -> CodedArray:
             rate=RateControl(qp=qp),
             gop=default_gop(source.array.fps),
             preset=EncoderConfig().chosen_preset,
+            keyframe_ratio=keyframe_ratio,
             on_picture=bar.update,
         )
 
