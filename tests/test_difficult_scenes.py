@@ -110,7 +110,7 @@ def quality(name: str, matcher: str) -> float:
     [
         ("wires", "joint", 0.05),
         ("wires", "balanced", 0.2),
-        ("mirrors", "joint", 0.35),
+        ("mirrors", "joint", 0.05),
         ("mirrors", "balanced", 0.2),
         ("studs", "joint", 0.05),
         ("studs", "balanced", 0.2),

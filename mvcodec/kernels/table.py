@@ -40,6 +40,7 @@ MATCHING = (
     "completion.unseen",
     "subpixel_pull.add_pull",
     "geodesic.carry",
+    "contours.widen",
     "enlargement.enlarge",
     "specks.smooth_over",
     "matching_rows.consistent",

@@ -25,6 +25,7 @@ from mvcodec.stereo.joint_settings import JointSettings
 from mvcodec.stereo.matching_view import CameraPartners, MatchingViews, equal_grey, prepare_views
 from mvcodec.stereo.partners import neighbours, outside, partners, steps, unseen_border
 from mvcodec.stereo.scanlines import MAX_SUM, ScratchPool, decide
+from mvcodec.stereo.soft_edges import widen
 from mvcodec.stereo.subpixel import refine
 from mvcodec.workers import run_all
 
@@ -77,7 +78,11 @@ class Joint:
                 cameras,
             )
             maps = dict(zip(cameras, extended, strict=True))
-        return self._finished(maps, valid)
+        levels = self.settings.plain_levels
+        widened = run_all(
+            lambda camera: widen(maps[camera], views, CameraPartners.of(array, camera), levels), cameras
+        )
+        return self._finished(dict(zip(cameras, widened, strict=True)), valid)
 
     def _finished(
         self, maps: Mapping[Position, FloatMap], valid: Mapping[Position, Mask]

@@ -73,6 +73,13 @@ class JointSettings:
         high=1e6,
     )
     thin_area_px: int = setting(16, "and that have at least this many pixels", low=0, high=1e6)
+    plain_levels: int = setting(
+        7,
+        "surfaces take over a pixel of ground beside them that varies by less, where their edge moves with"
+        " them, grey levels; 0: none",
+        low=0,
+        high=255,
+    )
     speck_area_px: int = setting(
         30,
         "smaller pieces that contradict all around them give way to that, pixels; 1: none",
@@ -120,6 +127,7 @@ SMALL_CENSUS: dict[str, Any] = {
     "most_bits": 10,
     "small_step": 18,
     "jump": 85,
+    "plain_levels": 0,
 }
 
 BALANCED: dict[str, Any] = {**SMALL_CENSUS, "subpixel_steps": 0, "full_size_steps": 2}
@@ -136,5 +144,5 @@ REALTIME: dict[str, Any] = {
     "subpixel_steps": 0,
 }
 
-SMALL_PICTURES: dict[str, Any] = {"completion": True, "beyond_partners": True}
+SMALL_PICTURES: dict[str, Any] = {"completion": True, "beyond_partners": True, "plain_levels": 7}
 """What pictures that are too small to be shrunk have time for in real time."""
