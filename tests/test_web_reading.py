@@ -158,6 +158,41 @@ def test_a_decoder_that_falls_silent_is_replaced_by_software(chromium: Browser, 
         assert page.evaluate("window.troubles") == []
 
 
+def test_every_decoded_frame_is_closed_in_time(chromium: Browser, site: Site) -> None:
+    """A decoder stalls once about eight of its frames are open."""
+    for page in watched_page(chromium, 640, 480):
+        page.add_init_script("""
+            window.made = window.most = 0;
+            window.open = new Map();
+            window.VideoDecoder = class extends VideoDecoder {
+                constructor({ output, error }) {
+                    const frames = new Set();
+                    super({ error, output: (frame) => {
+                        const { close } = frame;
+                        frame.close = () => (frames.delete(frame), close.call(frame));
+                        frames.add(frame);
+                        window.made++;
+                        window.most = Math.max(window.most, frames.size);
+                        output(frame);
+                    } });
+                    window.open.set(this, frames);
+                }
+            };
+        """)
+        content = encoded_file(
+            make_array(fps=30.0), 30, gop=30, preset="ultrafast", matcher="sgbm"
+        )
+        site.put("long.mcap", content)
+        open_player(page, site, "long.mcap", 'view="0.5,0.5"')
+        for frame in (29, 0, 17):
+            page.evaluate("(frame) => document.querySelector('mvcodec-player').seek(frame)", frame)
+        tracks = page.evaluate("window.open.size")
+        assert page.evaluate("window.made") > 30 * tracks / 2
+        page.wait_for_function("[...window.open.values()].every((frames) => frames.size === 0)")
+        assert page.evaluate("window.most") < 8
+        assert page.evaluate("window.troubles") == []
+
+
 def test_damage_is_skipped_to_the_next_keyframe_and_told(tab: Page, site: Site, tmp_path: Path) -> None:
     broken = damage(SAMPLE, tmp_path / "broken.mcap", 0)
     site.put("broken.mcap", broken.read_bytes())
