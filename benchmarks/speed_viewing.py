@@ -8,6 +8,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import av
@@ -57,8 +58,8 @@ def viewing_rows() -> Iterator[Row]:
     synthesizer = make_synthesizer("layered")
 
     def all_views() -> None:
-        for view in virtual:
-            synthesizer.render(decoded, Viewpoint(*view))
+        # Side by side, as `mvcodec decode` renders them.
+        run_all(partial(synthesizer.render, decoded), [Viewpoint(*view) for view in virtual])
 
     def all_remaps() -> None:
         for _ in virtual:

@@ -11,40 +11,37 @@ from mvcodec.kernels.view_marks import list_marked
 FloatMap = NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True)
-def _is_own(v, u, rows, columns, count):  # type: ignore[no-untyped-def]
-    own = False
-    for i in range(count):
-        own |= (rows[i] == v) & (columns[i] == u)
-    return own
+NEW, OWN, MET = 0, 1, 2
+"""Pixels: not yet of any piece, of the piece that is being gathered, and of one that was before."""
 
 
 @njit(cache=True, nogil=True)
-def _gather(disparity, y, x, step, reach, gathered, rows, columns, around):  # type: ignore[no-untyped-def]
-    """How many pixels the piece of (x, y) has, 0 where too many, and how many values are around it."""
+def _gather(disparity, y, x, step, reach, pieces, rows, columns, around):  # type: ignore[no-untyped-def]
+    """Gather the piece of (x, y): whether it is small, how many pixels, how many values around it."""
     height, width = disparity.shape
     rows[0], columns[0] = y, x
-    gathered[y, x] = True
+    pieces[y, x] = OWN
     count, beside, at = 1, 0, 0
     while at < count:
         row, column = rows[at], columns[at]
+        here = disparity[row, column]
         at += 1
         for v in range(max(row - reach, 0), min(row + reach + 1, height)):
             for u in range(max(column - reach, 0), min(column + reach + 1, width)):
-                if abs(disparity[v, u] - disparity[row, column]) > step:
+                if abs(disparity[v, u] - here) > step:
                     if max(abs(v - row), abs(u - column)) == 1:
                         around[beside] = disparity[v, u]
                         beside += 1
-                elif not gathered[v, u]:
+                elif pieces[v, u] == NEW:
                     if count >= len(rows) - 1:
-                        return 0, 0
-                    gathered[v, u] = True
+                        return False, count, 0
+                    pieces[v, u] = OWN
                     rows[count], columns[count] = v, u
                     count += 1
-                elif not _is_own(v, u, rows, columns, count):
-                    # It was met before and is not a small piece: that would have been gathered as a whole.
-                    return 0, 0
-    return (count if count < len(rows) else 0), beside
+                elif pieces[v, u] == MET:
+                    # It is no small piece: that would have been gathered as a whole.
+                    return False, count, 0
+    return count < len(rows), count, beside
 
 
 @njit(cache=True, nogil=True)
@@ -64,7 +61,7 @@ def smooth_over(
     """
     height, width = disparity.shape
     apart = np.float32(step)
-    gathered = np.zeros((height, width), np.bool_)
+    pieces = np.full((height, width), NEW, np.uint8)
     rows, columns = np.empty((2, fewest), np.int32)
     around = np.empty(8 * fewest, np.float32)
     marks, chosen = np.empty(width, np.uint8), np.empty(width, np.int32)
@@ -75,9 +72,10 @@ def smooth_over(
         for x in range(1, width):
             marks[x] |= abs(here[x] - here[x - 1]) > apart
         for x in chosen[: list_marked(marks, chosen)]:
-            if not gathered[y, x]:
-                count, beside = _gather(disparity, y, x, apart, reach, gathered, rows, columns, around)
-                if count and beside:
-                    middle = np.sort(around[:beside])[beside // 2]
-                    for i in range(count):
+            if pieces[y, x] == NEW:
+                small, count, beside = _gather(disparity, y, x, apart, reach, pieces, rows, columns, around)
+                middle = np.sort(around[:beside])[beside // 2] if small and beside else np.float32(0)
+                for i in range(count):
+                    pieces[rows[i], columns[i]] = MET
+                    if small and beside:
                         out[rows[i], columns[i]] = middle
