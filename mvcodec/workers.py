@@ -9,8 +9,9 @@ from __future__ import annotations
 import contextvars
 import os
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -24,7 +25,7 @@ MAX_THREADS = 256
 Result = TypeVar("Result")
 
 _scope: contextvars.ContextVar[int | None] = contextvars.ContextVar("threads", default=None)
-_pools: dict[int, ThreadPoolExecutor] = {}
+_pools: dict[int, _Pool] = {}
 _lock = threading.Lock()
 
 
@@ -117,60 +118,134 @@ def _cores() -> int:
 
 
 class Job(Generic[Result]):
-    """Something that a thread of the pool does, or whoever needs it first."""
+    """Something that a thread of the pool does, or whoever needs it first.
+
+    A plain lock says that it is done: futures cost several times as much, which counts where jobs are short.
+    """
 
     def __init__(self, function: Callable[..., Result], arguments: tuple[Any, ...]) -> None:
-        self._work: Callable[[], Result] = lambda: function(*arguments)
+        self._work: Callable[[], Result] | None = partial(function, *arguments)
         self._context = contextvars.copy_context()
-        self._future: Future[Result] = Future()
-        self._begun = threading.Lock()
+        self._begun, self._undone = threading.Lock(), threading.Lock()
+        self._undone.acquire()
+        self._found: Result
+        self._error: BaseException | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether it has come to its end, good or bad."""
+        return not self._undone.locked()
 
     def begin(self) -> None:
         """Do it now, unless somebody has begun."""
         if not self._begun.acquire(blocking=False):
             return
+        work, self._work = self._work, None
+        assert work is not None
         try:
-            found = self._context.run(self._work)
+            self._found = self._context.run(work)
         except BaseException as error:
-            self._future.set_exception(error)
+            self._error = error
             if not isinstance(error, Exception):
                 raise
-        else:
-            self._future.set_result(found)
+        finally:
+            del work  # what it needed is let go of before it counts as done
+            self._undone.release()
 
     def result(self) -> Result:
         """What came of it; does it here if nobody has begun. Raises what it raised."""
         self.begin()
-        return self._future.result()
+        self.wait()
+        if self._error is not None:
+            try:
+                raise self._error
+            finally:
+                del self  # the error's frames would hold the job, and it them
+        return self._found
 
     def wait(self) -> None:
         """Wait for its end, good or bad."""
-        wait([self._future])
+        if self._undone.locked():
+            with self._undone:
+                pass
 
     def cancel(self) -> None:
         """Let it be, if nobody has begun."""
         if self._begun.acquire(blocking=False):
-            self._future.cancel()
-            self._future.set_running_or_notify_cancel()
+            self._error = CancelledError()
+            self._undone.release()
+
+
+class _Pool:
+    """The threads beside the one that hands out the work. What is urgent is begun before what can wait."""
+
+    def __init__(self, helpers: int) -> None:
+        self._threads = ThreadPoolExecutor(helpers, "mvcodec")
+        self._helpers, self._busy = helpers, 0
+        self._urgent, self._later = deque[Callable[[], None]](), deque[Callable[[], None]]()
+        self._lock = threading.Lock()
+
+    def submit(self, begin: Callable[[], None], *, later: bool = False) -> None:
+        """Have it done; wake another thread only if one sleeps."""
+        with self._lock:
+            (self._later if later else self._urgent).append(begin)
+            if self._busy == self._helpers:
+                return
+            self._busy += 1
+        self._threads.submit(self._serve)
+
+    def take_later(self) -> Callable[[], None] | None:
+        """Something of what can wait, for who has to wait."""
+        with self._lock:
+            return self._later.popleft() if self._later else None
+
+    def _serve(self) -> None:
+        while (begin := self._next()) is not None:
+            with suppress(BaseException):  # who waits for the job is told
+                begin()
+
+    def _next(self) -> Callable[[], None] | None:
+        with self._lock:
+            for queue in (self._urgent, self._later):
+                if queue:
+                    return queue.popleft()
+            self._busy -= 1
+            return None
 
 
 def submit(function: Callable[..., Result], *arguments: Any) -> Job[Result]:
     """Start a job on the shared pool; with one thread it is done before this returns."""
-    job = Job(function, arguments)
+    return _submit(Job(function, arguments), later=False)
+
+
+def submit_later(function: Callable[..., Result], *arguments: Any) -> Job[Result]:
+    """Like `submit`, but it is begun when a thread has nothing else to do, or to wait for.
+
+    Such a job must wait for no other, since it is done in the midst of jobs that it knows nothing of.
+    """
+    return _submit(Job(function, arguments), later=True)
+
+
+def _submit(job: Job[Result], *, later: bool) -> Job[Result]:
     count = thread_count()
     if count == 1:
         job.begin()
     else:
-        _pool(count).submit(job.begin)
+        _pool(count).submit(job.begin, later=later)
     return job
 
 
 def settle(jobs: Iterable[Job[Any]]) -> None:
-    """Do what nobody has begun, the last first, and wait for the rest. Errors stay in the jobs."""
+    """Do what nobody has begun, the last first, and wait for the rest. Errors stay in the jobs.
+
+    Who waits meanwhile does what can wait (`submit_later`).
+    """
     waiting = list(jobs)
     for job in reversed(waiting):
         job.begin()
     for job in waiting:
+        while not job.done and (begin := _pool(thread_count()).take_later()) is not None:
+            begin()
         job.wait()
 
 
@@ -194,9 +269,10 @@ def run_in_bands(length: int, work: Callable[..., object], *arguments: object) -
     run_all(partial(work, *arguments), edges[:-1], edges[1:])
 
 
-def _pool(count: int) -> ThreadPoolExecutor:
+def _pool(count: int) -> _Pool:
     """The pool of everything that computes with this many threads; whoever waits is one of them."""
-    with _lock:
-        if count not in _pools:
-            _pools[count] = ThreadPoolExecutor(count - 1, "mvcodec")
-        return _pools[count]
+    pool = _pools.get(count)
+    if pool is None:
+        with _lock:
+            pool = _pools.setdefault(count, _Pool(count - 1))
+    return pool

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,7 +22,16 @@ from mvcodec.synthesis.layered import Layered
 from mvcodec.synthesis.quick import Quick
 from mvcodec.synthesis.synthesizer import Synthesizer
 from mvcodec.video.codecs import CODECS
-from mvcodec.workers import run_all, run_in_bands, set_threads, settle, submit, thread_count, threads
+from mvcodec.workers import (
+    run_all,
+    run_in_bands,
+    set_threads,
+    settle,
+    submit,
+    submit_later,
+    thread_count,
+    threads,
+)
 
 NUMBERS = (1, 2, 3, 8)
 ARRAY = make_array(70, 51)
@@ -95,6 +105,57 @@ def test_a_job_that_nobody_has_begun_can_be_left() -> None:
         go.set()
         settle([first, second])
         first.result()
+
+
+def test_what_can_wait_is_begun_last() -> None:
+    begun, go, order = threading.Event(), threading.Event(), list[str]()
+
+    def block() -> None:
+        begun.set()
+        go.wait(60)
+
+    with threads(2):
+        first = submit(block)
+        begun.wait(60)
+        jobs = [
+            submit_later(order.append, "later"),
+            submit(order.append, "now"),
+            submit(order.append, "then"),
+        ]
+        go.set()
+        for job in [first, *jobs]:
+            job.wait()
+    assert order == ["now", "then", "later"]
+
+
+def test_who_has_to_wait_does_what_can_wait() -> None:
+    begun, done = threading.Event(), threading.Event()
+
+    def needs_the_other() -> bool:
+        begun.set()
+        return done.wait(60)
+
+    with threads(2):
+        first = submit(needs_the_other)
+        begun.wait(60)  # the only other thread waits now
+        later = submit_later(done.set)
+        settle([first])
+        assert first.result()
+        assert later.done
+
+
+def test_jobs_let_go_of_what_they_needed() -> None:
+    class Thing:
+        pass
+
+    for number in NUMBERS:
+        with threads(number):
+            thing = Thing()
+            gone = weakref.ref(thing)
+            job = submit(lambda _: 5, thing)
+            del thing
+            assert job.result() == 5
+            assert gone() is None
 
 
 @pytest.mark.parametrize("length", [0, 1, 5, 64])

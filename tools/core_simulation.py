@@ -49,8 +49,11 @@ class Traced:
 class _NoPool:
     """Jobs are done by whoever waits for them, one after the other."""
 
-    def submit(self, begin: Callable[[], None]) -> None:
+    def submit(self, begin: Callable[[], None], *, later: bool = False) -> None:
         """Leave it."""
+
+    def take_later(self) -> None:
+        """Nothing is ever waited for."""
 
 
 @contextlib.contextmanager
@@ -72,7 +75,7 @@ def _tracing(root: Traced) -> Iterator[None]:
             doing[-1].events.append(("submit", traces[self]))
 
         def begin(self) -> None:
-            if self._future.done():
+            if self.done:
                 return
             work()
             doing[-1].events.append(("wait", traces[self]))

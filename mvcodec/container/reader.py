@@ -123,6 +123,11 @@ class McapReader(Closing):
         return self._chunks.size
 
     @property
+    def complete(self) -> bool:
+        """Whether it is a whole file with its index, not a pipe nor one that was cut short or still grows."""
+        return self._chunks.indexed
+
+    @property
     def has_layer(self) -> bool:
         """Whether a complete file has an enhancement layer; of others, whether one was met so far."""
         return LAYER_TRACK.topic in self._chunks.topics

@@ -31,8 +31,9 @@ from mvcodec.frames import DecodedSet, DisparityMap, Picture
 from mvcodec.settings import Setting
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, view_name
+from mvcodec.video.codec import Planes
 from mvcodec.video.colour import to_picture
-from mvcodec.workers import check_threads
+from mvcodec.workers import Job, check_threads
 
 OnError = Literal["skip", "stop"]
 ON_ERROR = Setting(
@@ -93,6 +94,8 @@ class Decoder(Closing):
         self.enhanced = enhanced
         self._layer: EnhancedViews | None = None
         self._waiting: WaitingSet | None = None
+        self._with_layer = self._ahead = False
+        self._begun: tuple[PacketSet, dict[Track, Job[Planes]]] | None = None
 
     @classmethod
     def open(
@@ -120,7 +123,8 @@ class Decoder(Closing):
         decoder = cls(on_error, limits, matcher, threads=threads, enhanced=enhanced)
         try:
             on_damage = _warn if on_error == "skip" else None
-            decoder._reader = McapReader.open(source, limits, on_damage, layer=decoder._wants_layer)
+            decoder._with_layer = decoder._wants_layer
+            decoder._reader = McapReader.open(source, limits, on_damage, layer=decoder._with_layer)
             decoder._name = decoder._reader.name
             decoder._assembler = Assembler(decoder._name, _warn)
             decoder._start(decoder._reader.header)
@@ -159,6 +163,9 @@ class Decoder(Closing):
     def __iter__(self) -> Iterator[DecodedSet]:
         """Decode the source given to `open`. A pipe can be gone through once only.
 
+        With several threads the frame set after the one that comes out is decoded meanwhile, if the source is
+        a whole file and no enhanced views are wanted.
+
         Raises:
             StreamError: damage, with topic and time.
         """
@@ -166,19 +173,27 @@ class Decoder(Closing):
             raise StreamError(self._name, "a decoder without a source", "Decoder.open(source)")
         self._start(self._reader.header)
         start, stop = self._reader.resolve(self._frames)
-        number = before = latest = index = -1
-        for number, packet in self._reader.packets(start, stop):
-            if packet.index != index:
-                before, index = latest, packet.index
-            latest = number
-            for decoded in self.push(packet):
-                # A frame set with missing packets comes out with the first packet of the next.
-                if (number if decoded.index == index else before) >= start:
-                    yield decoded
-        if not self._reader.cut_off and number >= start:
-            yield from self._decode_all(self._assembler.flush())
+        number, numbers = -1, dict[int, int]()
+        # A whole file has what comes next at hand, so that tracks need not wait for each other.
+        with workers.threads(self._threads):
+            several = workers.thread_count() > 1
+        self._ahead = several and self._reader.complete and self._on_error == "stop" and not self._with_layer
+        try:
+            for number, packet in self._reader.packets(start, stop):
+                if packet.index not in numbers:
+                    # A frame set comes out while the next one but one is read, at the latest.
+                    numbers = dict([*numbers.items()][-2:]) | {packet.index: number}
+                yield from (each for each in self.push(packet) if numbers.get(each.index, number) >= start)
+            if not self._reader.cut_off:
+                rest = self._decode_all(self._assembler.flush())
+                yield from (each for each in rest if numbers.get(each.index, number) >= start)
+        except Exception:  # of what comes after the frame set that was begun
+            yield from (each for each in self._finish_begun() if numbers.get(each.index, number) >= start)
+            raise
+        finally:
+            self._ahead = False
         if number >= start:
-            yield from self._release()
+            yield from [*self._finish_begun(), *self._release()]
         if number < start:
             raise SettingError(
                 "frames", f"{start}:", f"less than the {number + 1} frame sets of {self._name}"
@@ -226,7 +241,7 @@ class Decoder(Closing):
 
     def _push_header(self, packet: Packet) -> list[DecodedSet]:
         """A keyframe begins, where all that was lost is found again."""
-        done = [*self._decode_all(self._assembler.push(packet)), *self._release()]
+        done = [*self._decode_all(self._assembler.push(packet)), *self._finish_begun(), *self._release()]
         header = StreamHeader.from_json(packet.data, self._name)
         if header != self._header:
             self._start(header)
@@ -243,7 +258,7 @@ class Decoder(Closing):
         self._tracks = tracks
         self._assembler.start(header.tracks)
         self._absent, self._skipping = frozenset(), False
-        self._layer = None
+        self._layer, self._begun = None, None
 
     @property
     def _wants_layer(self) -> bool:
@@ -300,8 +315,32 @@ class Decoder(Closing):
         self._skipping = True
 
     def _decode(self, packets: PacketSet) -> list[DecodedSet]:
-        """Decode a frame set; nothing, where no map can be had of any camera that is there."""
-        planes, reasons = self._tracks.decode(packets, self._assembler.label)
+        """Decode a frame set; ahead, begin it and finish the one before."""
+        label, before = self._assembler.label, self._begun
+        if not self._ahead or self.header.predicted:
+            return self._finish(packets, self._tracks.begin(packets, label, {}))
+        if before is None or before[0].missing:  # what is missing is noted when a frame set is finished
+            done = self._finish_begun()
+            self._begun = packets, self._tracks.begin(packets, label, {})
+            return done
+        self._begun = packets, self._tracks.begin(packets, label, before[1])
+        try:
+            return self._finish(*before)
+        except StreamError:
+            self._begun = None
+            raise
+
+    def _finish_begun(self) -> list[DecodedSet]:
+        """The frame set that was begun ahead, if there is one."""
+        begun, self._begun = self._begun, None
+        if begun is None:
+            return []
+        with workers.threads(self._threads):
+            return self._finish(*begun)
+
+    def _finish(self, packets: PacketSet, jobs: Mapping[Track, Job[Planes]]) -> list[DecodedSet]:
+        """The decoded set; nothing, where no map can be had of any camera that is there."""
+        planes, reasons = self._tracks.finish(packets, jobs, self._assembler.label)
         array, span, first = self.header.array, self.header.disparity_range_px, packets.first
         self._tell_absent(reasons, first)
         there = [camera for camera in array.real if camera not in reasons]

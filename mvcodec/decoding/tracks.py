@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -48,12 +48,34 @@ class Tracks:
     def __contains__(self, track: object) -> bool:
         return track in self._decoders or track in self._predicted
 
-    def decode(
-        self, packets: PacketSet, label: Callable[[Packet], str]
-    ) -> tuple[dict[Track, Planes], dict[Position, StreamError]]:
-        """Decode every track of a frame set, side by side.
+    def begin(
+        self, packets: PacketSet, label: Callable[[Packet], str], before: Mapping[Track, Job[Planes]]
+    ) -> dict[Track, Job[Planes]]:
+        """Begin to decode every track of a frame set, side by side.
 
         Args:
+            label: what to call a packet in an error.
+            before: what was begun and not finished of the frame set before.
+        """
+        return {
+            track: submit(
+                _decode_after,
+                before.get(track),
+                self._decoders[track],
+                packet,
+                label(packet),
+            )
+            for track, packet in packets.packets.items()
+            if track in self._decoders
+        }
+
+    def finish(
+        self, packets: PacketSet, jobs: Mapping[Track, Job[Planes]], label: Callable[[Packet], str]
+    ) -> tuple[dict[Track, Planes], dict[Position, StreamError]]:
+        """Decode what is left of a frame set that was begun.
+
+        Args:
+            jobs: what `begin` gave.
             label: what to call a packet in an error.
 
         Returns:
@@ -62,13 +84,6 @@ class Tracks:
         Raises:
             StreamError: damage.
         """
-        jobs: dict[Track, Job[Planes]] = {
-            track: submit(
-                self._decoders[track].push, packet.data, packet.keyframe, label(packet), packet.index
-            )
-            for track, packet in packets.packets.items()
-            if track in self._decoders
-        }
         settle(jobs.values())
         planes: dict[Track, Planes] = {}
         reasons: dict[Position, StreamError] = {}
@@ -109,6 +124,12 @@ class Tracks:
             else:
                 planes[track] = found
                 frame.add(each.camera, found)
+
+
+def _decode_after(before: Job[Planes] | None, decoder: TrackDecoder, packet: Packet, label: str) -> Planes:
+    if before is not None:
+        settle([before])
+    return decoder.push(packet.data, packet.keyframe, label, packet.index)
 
 
 def _predictions(frame: FramePrediction, predicted: PredictedCamera) -> list[Planes]:

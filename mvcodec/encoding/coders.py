@@ -20,7 +20,7 @@ from mvcodec.video.codecs import find_codec
 from mvcodec.video.colour import even_size, grey_planes, to_planes
 from mvcodec.video.disparity_code import quantise
 from mvcodec.video.map_size import coded_size, to_coded
-from mvcodec.workers import Job, settle, submit, threads
+from mvcodec.workers import Job, settle, submit, submit_later, threads
 
 
 class Coders:
@@ -120,7 +120,7 @@ class Coders:
         for track in self._encoders:
             if track.kind is TrackKind.TEXTURE and track.camera is not None:
                 picture = frames.pictures[track.camera]
-                jobs[track] = submit(self._code_picture, track, picture, keyframe)
+                jobs[track] = submit_later(self._code_picture, track, picture, keyframe)
         maps = match()
         for camera in self._header.map_cameras:
             track = Track(TrackKind.DISPARITY, camera)
