@@ -19,6 +19,7 @@ from mvcodec.kernels.byte_vectors import (
     least,
     load,
     mean,
+    minus,
     minus_down_to_0,
     most,
     plus,
@@ -38,6 +39,15 @@ ONLY_BLIND_COST = 10
 
 
 @njit(cache=True, nogil=True)
+def _interval(here, before, after, down, up, x):  # type: ignore[no-untyped-def]
+    """Of 64 pixels of a row: half way to each neighbour, rounded down and rounded up."""
+    near, far = least(before, after), most(before, after)
+    # What is rounded down is the sum less what is rounded up, also where the sum is beyond 8 bits.
+    store(down, x, least(minus(plus(here, near), mean(here, near)), here))
+    store(up, x, most(mean(here, far), here))
+
+
+@njit(cache=True, nogil=True)
 def sampling_interval(planes: Bytes, along_rows: bool, bounds: Bytes) -> None:
     """Least and greatest value within half a pixel either way (Birchfield and Tomasi 1998).
 
@@ -47,22 +57,28 @@ def sampling_interval(planes: Bytes, along_rows: bool, bounds: Bytes) -> None:
         bounds: uint8 (H, 2, C, W), written: least, rounded down, and greatest, rounded up.
     """
     height, channels, width = planes.shape
-    before, after = np.empty(width, np.uint8), np.empty(width, np.uint8)
+    # Rows are copied by loops, and to room for whole vectors: assigning slices costs more than all the rest.
+    room = max(width, LANES)
+    wide = np.zeros(room + 2, np.uint8)
+    above, below = np.zeros(room, np.uint8), np.zeros(room, np.uint8)
+    down, up = np.empty(room, np.uint8), np.empty(room, np.uint8)
+    one, two = np.uint64(1), np.uint64(2)
     for y in range(height):
         for channel in range(channels):
             here = planes[y, channel]
-            if not along_rows:
-                before[:], after[:] = planes[max(y - 1, 0), channel], planes[min(y + 1, height - 1), channel]
-            else:
-                before[0], after[width - 1] = here[0], here[width - 1]
-                before[1:], after[:-1] = here[:-1], here[1:]
-            least, greatest = bounds[y, 0, channel], bounds[y, 1, channel]
+            over, under = planes[max(y - 1, 0), channel], planes[min(y + 1, height - 1), channel]
             for x in range(width):
-                one = np.uint16(np.uint16(here[x]) + np.uint16(before[x]))
-                two = np.uint16(np.uint16(here[x]) + np.uint16(after[x]))
-                low, high = np.uint8(min(one, two) >> 1), np.uint8((max(one, two) + 1) >> 1)
-                least[x] = min(low, here[x])
-                greatest[x] = max(high, here[x])
+                wide[x + 1], above[x], below[x] = here[x], over[x], under[x]
+            wide[0], wide[width + 1] = here[0], here[width - 1]
+            for start in range(0, room, LANES):
+                x = np.uint64(min(start, room - LANES))  # the last vector overlaps the one before it
+                if along_rows:
+                    _interval(load(wide, x + one), load(wide, x), load(wide, x + two), down, up, x)
+                else:
+                    _interval(load(wide, x + one), load(above, x), load(below, x), down, up, x)
+            low, high = bounds[y, 0, channel], bounds[y, 1, channel]
+            for x in range(width):
+                low[x], high[x] = down[x], up[x]
 
 
 @njit(cache=True, nogil=True)
