@@ -71,11 +71,11 @@ def sampling_interval(planes: Bytes, along_rows: bool, bounds: Bytes) -> None:
                 wide[x + 1], above[x], below[x] = here[x], over[x], under[x]
             wide[0], wide[width + 1] = here[0], here[width - 1]
             for start in range(0, room, LANES):
-                x = np.uint64(min(start, room - LANES))  # the last vector overlaps the one before it
+                at = np.uint64(min(start, room - LANES))  # the last vector overlaps the one before it
                 if along_rows:
-                    _interval(load(wide, x + one), load(wide, x), load(wide, x + two), down, up, x)
+                    _interval(load(wide, at + one), load(wide, at), load(wide, at + two), down, up, at)
                 else:
-                    _interval(load(wide, x + one), load(above, x), load(below, x), down, up, x)
+                    _interval(load(wide, at + one), load(above, at), load(below, at), down, up, at)
             low, high = bounds[y, 0, channel], bounds[y, 1, channel]
             for x in range(width):
                 low[x], high[x] = down[x], up[x]
