@@ -81,6 +81,17 @@ def test_an_error_comes_after_all_frame_sets_before_it(
 
 
 @pytest.mark.parametrize("threads", THREADS)
+@pytest.mark.parametrize("place", [2, 3, 8])
+def test_so_it_does_where_packets_are_missing_too(
+    coded: list[list[Packet]], threads: int, place: int
+) -> None:
+    kept = [*coded[place][:-2], replace(coded[place][-2], data=b"noise" * 20)]
+    found, told = _until_error(_file([*coded[:place], kept, *coded[place + 1 :]]), threads)
+    assert [decoded.index for decoded in found] == list(range(place))
+    assert f"{kept[-1].track.topic} at {place / 10:.3f} s" in told
+
+
+@pytest.mark.parametrize("threads", THREADS)
 def test_damage_of_the_file_is_told_after_what_was_begun(threads: int) -> None:
     content = bytearray(encoded_file(ARRAY, COUNT, gop=GOP))
     content[chunk_ends(bytes(content))[-1] - 20] ^= 0xFF

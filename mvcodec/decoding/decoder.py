@@ -183,6 +183,9 @@ class Decoder(Closing):
                 if packet.index not in numbers:
                     # A frame set comes out while the next one but one is read, at the latest.
                     numbers = dict([*numbers.items()][-2:]) | {packet.index: number}
+                # Alone, so that it is not lost with an error of the one behind it, which a header ends.
+                begun = self._finish_begun() if packet.track.kind is TrackKind.HEADER else []
+                yield from (each for each in begun if numbers.get(each.index, number) >= start)
                 yield from (each for each in self.push(packet) if numbers.get(each.index, number) >= start)
             if not self._reader.cut_off:
                 rest = self._decode_all(self._assembler.flush())
