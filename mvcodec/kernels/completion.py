@@ -81,8 +81,9 @@ def _add_seen_through(others, there, nearest, first, count, seen):  # type: igno
 def _ruled_out(valid, seen, through_cost, most, costs):  # type: ignore[no-untyped-def]
     """What is not valid has no cost but that of being seen through."""
     for x in range(valid.size):
+        held = costs[x]  # loaded before it is chosen: only that is vectorised
         through = np.uint8(min(np.uint16(np.uint16(seen[x]) * through_cost), most))
-        costs[x] = costs[x] if valid[x] else through
+        costs[x] = held if valid[x] else through
 
 
 @njit(cache=True, nogil=True)
