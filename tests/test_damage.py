@@ -63,6 +63,14 @@ def test_a_file_cut_around_chunk_boundaries_decodes_up_to_there(file: bytes) -> 
             _check_cut(file, cut)
 
 
+def test_a_file_cut_within_the_head_of_a_chunk_decodes_up_to_there(tiny: bytes) -> None:
+    summary = make_reader(io.BytesIO(tiny)).get_summary()
+    assert summary is not None
+    start = summary.chunk_indexes[1].chunk_start_offset
+    for cut in range(start, start + 60):
+        assert _check_cut(tiny, cut, TINY_GOP)
+
+
 def test_a_file_cut_at_500_random_bytes_decodes_up_to_there(
     tiny: bytes, record_property: Callable[[str, object], None]
 ) -> None:

@@ -163,6 +163,8 @@ def parse_chunk(content: bytes, limits: Limits, *, whole: bool = True) -> tuple[
         raise RecordError("a chunk that ends too early")
     start_ns, end_ns, size, crc, length = _CHUNK_HEAD.unpack_from(content)
     name = content[_CHUNK_HEAD.size : _CHUNK_HEAD.size + length]
+    if not whole and len(name) < length:
+        raise RecordError("a chunk that ends too early")
     if name not in PACKINGS:
         raise UnknownPacking(f"chunks packed with {name[:20].decode(errors='replace')!r}")
     if size > limits.max_chunk_bytes:
