@@ -179,9 +179,7 @@ def test_every_decoded_frame_is_closed_in_time(chromium: Browser, site: Site) ->
                 }
             };
         """)
-        content = encoded_file(
-            make_array(fps=30.0), 30, gop=30, preset="ultrafast", matcher="sgbm"
-        )
+        content = encoded_file(make_array(fps=30.0), 30, gop=30, preset="ultrafast", matcher="sgbm")
         site.put("long.mcap", content)
         open_player(page, site, "long.mcap", 'view="0.5,0.5"')
         for frame in (29, 0, 17):
