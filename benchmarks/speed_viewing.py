@@ -8,14 +8,13 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 
 import av
 from av.video.codeccontext import VideoCodecContext
 from speed_measures import QP, Material, Row, bicubic, material, take_turns
 
-from mvcodec.array import Viewpoint
+from mvcodec.array import Position, Viewpoint
 from mvcodec.container import McapWriter
 from mvcodec.decoding.decoder import Decoder
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
@@ -57,9 +56,11 @@ def viewing_rows() -> Iterator[Row]:
     virtual = [view for view in made.array.positions if view not in made.array.real]
     synthesizer = make_synthesizer("layered")
 
+    def render(view: Position) -> None:
+        synthesizer.render(decoded, Viewpoint(*view))
+
     def all_views() -> None:
-        # Side by side, as `mvcodec decode` renders them.
-        run_all(partial(synthesizer.render, decoded), [Viewpoint(*view) for view in virtual])
+        run_all(render, virtual)  # side by side, as `mvcodec decode` does
 
     def all_remaps() -> None:
         for _ in virtual:
