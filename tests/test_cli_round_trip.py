@@ -216,7 +216,8 @@ def test_every_setting_at_once(array: Path, tmp_path: Path) -> None:
     info = json.loads(out)
     assert len(info["real"]) == 9
     assert info["frames"] == 3
-    assert info["disparity_range_px"] == [-2.0, 6.0]
+    low, high = info["disparity_range_px"]
+    assert -2 <= low < high <= 6
     assert info["disparity_scale"] == 2
     assert "maps of half size" in succeeds("info", tmp_path / "x.mcap")
     assert "clean" in succeeds("validate", tmp_path / "x.mcap")
@@ -226,13 +227,18 @@ def test_every_setting_at_once(array: Path, tmp_path: Path) -> None:
     assert json.loads(rated)["frames"] == FRAMES
 
 
-def test_a_range_that_the_pictures_exceed_is_widened_and_told_unless_it_is_exact(
+def test_a_range_is_widened_and_told_or_narrowed_as_the_pictures_ask_unless_it_is_exact(
     array: Path, tmp_path: Path
 ) -> None:
     options = array, tmp_path / "x.mcap", "--frames", ":1", "--disparity-range", "0,2", "--dry-run"
     done = mvcodec("encode", *options)
     assert "beyond the stated 0..2 px; widened to 0..8 px (--exact-range keeps it as stated)" in done.stderr
     assert json.loads(done.stdout)["disparity_range_px"] == [0, 8]
+    wide = mvcodec("encode", *options[:-2], "-200,200", "--dry-run")
+    assert "the pictures show" not in wide.stderr
+    low, high = json.loads(wide.stdout)["disparity_range_px"]
+    assert -8 <= low <= 0
+    assert 4 <= high <= 16
     exact = mvcodec("encode", *options, "--exact-range")
     assert "the pictures show" not in exact.stderr
     assert json.loads(exact.stdout)["disparity_range_px"] == [0, 2]

@@ -25,7 +25,7 @@ from mvcodec.encoding.speed_choice import FOR_FILES, FOR_LIVE
 from mvcodec.errors import SettingError
 from mvcodec.frames import FrameSet
 from mvcodec.layers.refinement import matcher_choices
-from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range, make_room
+from mvcodec.stereo.disparity_range import MAX_FRAMES, estimate_range
 from mvcodec.stereo.given import given_range
 
 APART_S = 0.5
@@ -79,7 +79,8 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
         "disparity_range_px",
         parse=disparity_range,
         metavar="LO,HI|auto",
-        note="; auto: estimated whatever the input states. Widened where the pictures show more",
+        note="; auto: estimated whatever the input states. Widened where the pictures show more, of files"
+        " narrowed where they show less",
     )
     parser.add_argument(
         "--exact-range",
@@ -140,7 +141,7 @@ def find_range(
 
     Args:
         given: the maps that the input has will be coded: their own range counts.
-        exact: the option's range is not widened where the pictures show more.
+        exact: the option's range is taken as it stands, not as a hint.
         first: the first frame set of those chosen, where it has been read already.
     """
     stated = option if isinstance(option, tuple) else None
@@ -148,7 +149,7 @@ def find_range(
         return stated
     samples = _samples(source, chosen, first)
     if stated:
-        return make_room(source.array, samples, stated, INSIST)
+        return estimate_range(source.array, samples, stated, INSIST)
     if given:
         return given_range(samples)
     hint = None if option == "auto" else source.array.disparity_hint_px

@@ -40,6 +40,7 @@ _NEAR_CLUSTER, _FAR_CLUSTER = 0.0007, 0.003
 _NEAR_TAIL, _FAR_TAIL = 0.0005, 0.001
 _NEAR_MARGIN, _FAR_MARGIN = 0.1, 0.02
 _LEAST_MARGIN_PX = 1.0
+_HINT_ADVICE = "state disparity_per_step_px anew, or leave it out"
 _BESIDE_HINT, _LEAST_BESIDE_PX = 0.5, 4.0
 """Of a hint's extent, and px, how far beyond it is looked: further, chance would find more than there is."""
 
@@ -62,7 +63,10 @@ class _Found:
 
 
 def estimate_range(
-    array: CameraArray, frame_sets: Sequence[FrameSet], hint_px: tuple[float, float] | None = None
+    array: CameraArray,
+    frame_sets: Sequence[FrameSet],
+    hint_px: tuple[float, float] | None = None,
+    advice: str = _HINT_ADVICE,
 ) -> tuple[float, float]:
     """Range of disparity between neighbouring real cameras, with a margin.
 
@@ -77,6 +81,7 @@ def estimate_range(
             camera's picture.
         hint_px: (lo, hi) between neighbouring real cameras that the result stays inside, unless the pictures
             show more: then it is widened, and a MvCodecWarning says so.
+        advice: what that warning says that can be done.
 
     Returns:
         (lo, hi), px, lo < hi; lo may be negative. Where next to nothing matches, a MvCodecWarning
@@ -104,7 +109,7 @@ def estimate_range(
         return fallback
     low, high = seen
     if hint_px is not None:
-        hint_px = _widened(hint_px, seen, array.name, "state disparity_per_step_px anew, or leave it out")
+        hint_px = _widened(hint_px, seen, array.name, advice)
     extent = high - low
     low -= _LEAST_MARGIN_PX + _FAR_MARGIN * extent
     high += _LEAST_MARGIN_PX + _NEAR_MARGIN * extent
@@ -115,6 +120,8 @@ def make_room(
     array: CameraArray, frame_sets: Sequence[FrameSet], stated_px: tuple[float, float], advice: str
 ) -> tuple[float, float]:
     """A range that somebody stated, or a wider one where the pictures show more: a MvCodecWarning says so.
+
+    Of live pictures: later ones may show what the first don't.
 
     Args:
         array, frame_sets: as in `estimate_range`.
