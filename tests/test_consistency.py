@@ -7,6 +7,7 @@ import pytest
 
 from mvcodec.frames import FloatMap, Mask
 from mvcodec.stereo.consistency import (
+    confirmed_range,
     cross_check,
     drop_speckles,
     fill_from_farther,
@@ -123,3 +124,15 @@ def test_cross_check_finishes_both_maps() -> None:
     assert (maps[0].values_px[:, 16:20] == 2).all()
     assert not maps[1].valid[:, 24:28].any()
     assert (maps[1].values_px[:, 24:28] == 2).all()
+
+
+def test_the_confirmed_range_holds_all_but_few_pixels() -> None:
+    values = np.full((100, 200), 20.0, np.float32)
+    values[:50] = 31.4
+    values[0, 0], values[0, 1:40] = 2, 44  # an error, and a small thing
+    every = np.ones(values.shape, np.bool_)
+    assert confirmed_range([(values, every)], (0.0, 60.0)) == (20.0, 44.0)
+    assert confirmed_range([(values, every), (values - 5, every)], (0.0, 60.0)) == (15.0, 44.0)
+    assert confirmed_range([(values, every & (values < 30))], (0.0, 60.0)) == (20.0, 20.0)
+    assert confirmed_range([(values, ~every)], (-3.5, 60.0)) == (-3.5, 60.0)
+    assert confirmed_range([(values - 40, every)], (-20.5, 4.5)) == (-20.0, 4.0)

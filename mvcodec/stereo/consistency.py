@@ -6,6 +6,9 @@ pictures (ULCC of the thesis, 6.1).
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+
 import cv2
 import numpy as np
 
@@ -14,6 +17,8 @@ from mvcodec.frames import DisparityMap, FloatMap, Mask
 SPECKLE_STEP_PX = 1.0
 SPECK_STEP_PX, SPECK_REACH_PX = 1.5, 2
 MEDIAN_SIZE = 5
+FAR_TAIL, NEAR_TAIL = 5e-4, 1e-4
+"""Of valid pixels, so many at either end are taken as wrong. What is near is a small thing more often."""
 _SIXTEENTHS = 16
 _SPECKLE_MARK = -32768
 
@@ -84,6 +89,29 @@ def drop_speckles(values_px: FloatMap, valid: Mask, min_area_px: int) -> Mask:
     marked = np.where(valid, scaled, _SPECKLE_MARK).astype(np.int16)
     cv2.filterSpeckles(marked, _SPECKLE_MARK, min_area_px, int(SPECKLE_STEP_PX * _SIXTEENTHS))
     return np.asarray(marked != _SPECKLE_MARK)
+
+
+def confirmed_range(
+    maps: Iterable[tuple[FloatMap, Mask]], range_px: tuple[float, float]
+) -> tuple[float, float]:
+    """The part of a range, px, in which the valid pixels of maps lie, less FAR_TAIL and NEAR_TAIL of them.
+
+    Args:
+        maps: float32 (H, W), px, and bool (H, W) each.
+        range_px: all values lie inside; it is returned where no pixel is valid.
+    """
+    low = math.floor(range_px[0])
+    levels = math.ceil(range_px[1]) - low + 1
+    counts = np.zeros(levels)
+    for values, valid in maps:
+        shown = valid.view(np.uint8)
+        counts += cv2.calcHist([values], [0], shown, [levels], [low - 0.5, low + levels - 0.5]).ravel()
+    upwards = np.cumsum(counts)
+    if not upwards[-1]:
+        return range_px
+    first = np.searchsorted(upwards, FAR_TAIL * upwards[-1], "right")
+    last = np.searchsorted(upwards, (1 - NEAR_TAIL) * upwards[-1])
+    return max(range_px[0], float(low + first)), min(range_px[1], float(low + last))
 
 
 def without_specks(values_px: FloatMap, fewest: int) -> FloatMap:

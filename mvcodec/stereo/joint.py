@@ -19,7 +19,13 @@ from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.frames import DisparityMap, FloatMap, Mask, Picture
-from mvcodec.stereo.consistency import drop_speckles, fill_from_farther, median, without_specks
+from mvcodec.stereo.consistency import (
+    confirmed_range,
+    drop_speckles,
+    fill_from_farther,
+    median,
+    without_specks,
+)
 from mvcodec.stereo.exposure import camera_gains
 from mvcodec.stereo.joint_settings import JointSettings
 from mvcodec.stereo.matching_view import CameraPartners, MatchingViews, equal_grey, prepare_views
@@ -118,11 +124,12 @@ class Joint:
         cameras: Sequence[Position],
     ) -> tuple[dict[Position, FloatMap], dict[Position, Mask]]:
         """Maps that are complete and sub-pixel, and where another camera confirms them."""
-        low, levels = _levels(range_px)
         raw, valid = self._matched(array, views, range_px, cameras)
         if not self.settings.completion:
             filled = run_all(lambda camera: self._filled(raw[camera], valid[camera], range_px), cameras)
             return dict(zip(cameras, filled, strict=True)), valid
+        # What nobody confirms has no other disparities than what somebody does.
+        low, levels = _levels(confirmed_range([(raw[c], valid[c]) for c in cameras], range_px))
         completed = run_all(
             lambda camera: self._complete(array, camera, views.grey_of(camera), raw, valid, low, levels),
             cameras,
