@@ -105,8 +105,12 @@ def test_damage_of_the_file_is_told_after_what_was_begun(threads: int) -> None:
 
 @pytest.mark.parametrize("threads", THREADS)
 @pytest.mark.parametrize("place", [1, 2, 3])
-def test_a_missing_packet_costs_its_camera_alone(coded: list[list[Packet]], threads: int, place: int) -> None:
-    gone = [*coded[:place], coded[place][:-1], *coded[place + 1 :]]
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_missing_packet_costs_its_camera_alone(
+    coded: list[list[Packet]], threads: int, place: int, count: int
+) -> None:
+    behind = place + count
+    gone = [*coded[:place], *(packets[:-1] for packets in coded[place:behind]), *coded[behind:]]
     with warnings.catch_warnings(record=True):
         warnings.simplefilter("always")
         expected = pushed(packet for packets in gone for packet in packets)

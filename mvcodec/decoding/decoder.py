@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Iterator, Mapping
-from functools import partial
 from pathlib import Path
 from typing import BinaryIO, Literal, get_args
 
@@ -14,26 +13,20 @@ from mvcodec.closing import Closing
 from mvcodec.container import McapReader
 from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
+from mvcodec.decoding.decoded_set import decoded_set
 from mvcodec.decoding.enhanced_views import EnhancedViews, WaitingSet
 from mvcodec.decoding.estimated_maps import (
-    MapsOnDemand,
-    can_be_estimated,
     decoding_matcher,
-    estimate_maps,
 )
-from mvcodec.decoding.on_demand import OnDemand
-from mvcodec.decoding.sent_maps import sent_maps
-from mvcodec.decoding.stand_in import fill_absent
+from mvcodec.decoding.pipeline import DecodedTracks, Pipeline
 from mvcodec.decoding.tracks import Tracks
 from mvcodec.enhancement import LAYER_TRACK, EnhancementHeader
 from mvcodec.errors import MvCodecWarning, SettingError, StreamClosed, StreamError
-from mvcodec.frames import DecodedSet, DisparityMap, Picture
+from mvcodec.frames import DecodedSet
 from mvcodec.settings import Setting
 from mvcodec.stereo.matcher import Matcher
-from mvcodec.stream import Packet, StreamHeader, Track, TrackKind, view_name
-from mvcodec.video.codec import Planes
-from mvcodec.video.colour import to_picture
-from mvcodec.workers import Job, check_threads
+from mvcodec.stream import Packet, StreamHeader, TrackKind, view_name
+from mvcodec.workers import check_threads
 
 OnError = Literal["skip", "stop"]
 ON_ERROR = Setting(
@@ -43,6 +36,9 @@ ON_ERROR = Setting(
     "at damage: go on with the next keyframe, or stop",
     choices=get_args(OnError),
 )
+
+AHEAD = 1
+"""Frame sets that are begun behind the one that comes out, where several threads decode a whole file."""
 
 
 class Decoder(Closing):
@@ -91,11 +87,11 @@ class Decoder(Closing):
         self._frames: slice | None = None
         self._name = name
         self._assembler = Assembler(self._name, _warn)
+        self._pipeline = Pipeline(self._tracks, self._assembler.label)
         self.enhanced = enhanced
         self._layer: EnhancedViews | None = None
         self._waiting: WaitingSet | None = None
-        self._with_layer = self._ahead = False
-        self._begun: tuple[PacketSet, dict[Track, Job[Planes]]] | None = None
+        self._with_layer, self._ahead = False, 0
 
     @classmethod
     def open(
@@ -163,40 +159,42 @@ class Decoder(Closing):
     def __iter__(self) -> Iterator[DecodedSet]:
         """Decode the source given to `open`. A pipe can be gone through once only.
 
-        With several threads the frame set after the one that comes out is decoded meanwhile, if the source is
-        a whole file and no enhanced views are wanted.
+        With several threads the frame sets after the one that comes out are decoded meanwhile, if the source
+        is a whole file and no enhanced views are wanted.
 
         Raises:
             StreamError: damage, with topic and time.
         """
         if self._reader is None:
             raise StreamError(self._name, "a decoder without a source", "Decoder.open(source)")
-        self._start(self._reader.header)
-        start, stop = self._reader.resolve(self._frames)
-        number, numbers = -1, dict[int, int]()
         # A whole file has what comes next at hand, so that tracks need not wait for each other.
         with workers.threads(self._threads):
             several = workers.thread_count() > 1
-        self._ahead = several and self._reader.complete and self._on_error == "stop" and not self._with_layer
+        ahead = several and self._reader.complete and self._on_error == "stop" and not self._with_layer
+        self._ahead = AHEAD if ahead else 0
+        self._start(self._reader.header)
+        start, stop = self._reader.resolve(self._frames)
+        number, numbers = -1, dict[int, int]()
         try:
             for number, packet in self._reader.packets(start, stop):
                 if packet.index not in numbers:
-                    # A frame set comes out while the next one but one is read, at the latest.
-                    numbers = dict([*numbers.items()][-2:]) | {packet.index: number}
-                # Alone, so that it is not lost with an error of the one behind it, which a header ends.
-                begun = self._finish_begun() if packet.track.kind is TrackKind.HEADER else []
+                    # A frame set comes out while the one after those begun behind it is read, at the latest.
+                    numbers = dict([*numbers.items()][-AHEAD - 1 :]) | {packet.index: number}
+                # Before the header is pushed, so that none is lost with an error of a later one.
+                begun = self._finish_begun() if packet.track.kind is TrackKind.HEADER else ()
                 yield from (each for each in begun if numbers.get(each.index, number) >= start)
                 yield from (each for each in self.push(packet) if numbers.get(each.index, number) >= start)
             if not self._reader.cut_off:
                 rest = self._decode_all(self._assembler.flush())
                 yield from (each for each in rest if numbers.get(each.index, number) >= start)
-        except Exception:  # of what comes after the frame set that was begun
+        except Exception:  # of what comes after the frame sets that were begun
             yield from (each for each in self._finish_begun() if numbers.get(each.index, number) >= start)
             raise
         finally:
-            self._ahead = False
+            self._ahead = 0
         if number >= start:
-            yield from [*self._finish_begun(), *self._release()]
+            yield from self._finish_begun()
+            yield from self._release()
         if number < start:
             raise SettingError(
                 "frames", f"{start}:", f"less than the {number + 1} frame sets of {self._name}"
@@ -261,7 +259,9 @@ class Decoder(Closing):
         self._tracks = tracks
         self._assembler.start(header.tracks)
         self._absent, self._skipping = frozenset(), False
-        self._layer, self._begun = None, None
+        self._layer = None
+        # Predictions are made out of pictures of the same time.
+        self._pipeline = Pipeline(tracks, self._assembler.label, 0 if header.predicted else self._ahead)
 
     @property
     def _wants_layer(self) -> bool:
@@ -304,7 +304,7 @@ class Decoder(Closing):
             done += self._release()
             try:
                 with workers.threads(self._threads):
-                    done += self._decode(packets)
+                    done += [found for each in self._pipeline.push(packets) for found in self._finish(each)]
             except StreamError as error:
                 self._skip(error)
         return done
@@ -317,62 +317,25 @@ class Decoder(Closing):
         self._assembler.drop()
         self._skipping = True
 
-    def _decode(self, packets: PacketSet) -> list[DecodedSet]:
-        """Decode a frame set; ahead, begin it and finish the one before."""
-        label, before = self._assembler.label, self._begun
-        if not self._ahead or self.header.predicted:
-            return self._finish(packets, self._tracks.begin(packets, label, {}))
-        if before is None or before[0].missing:  # what is missing is noted when a frame set is finished
-            done = self._finish_begun()
-            self._begun = packets, self._tracks.begin(packets, label, {})
-            return done
-        self._begun = packets, self._tracks.begin(packets, label, before[1])
-        try:
-            return self._finish(*before)
-        except StreamError:
-            self._begun = None
-            raise
+    def _finish_begun(self) -> Iterator[DecodedSet]:
+        """The frame sets that were begun ahead, one by one."""
+        while self._pipeline:
+            with workers.threads(self._threads):
+                done = self._finish(self._pipeline.pop())
+            yield from done
 
-    def _finish_begun(self) -> list[DecodedSet]:
-        """The frame set that was begun ahead, if there is one."""
-        begun, self._begun = self._begun, None
-        if begun is None:
-            return []
-        with workers.threads(self._threads):
-            return self._finish(*begun)
-
-    def _finish(self, packets: PacketSet, jobs: Mapping[Track, Job[Planes]]) -> list[DecodedSet]:
+    def _finish(self, tracks: DecodedTracks) -> list[DecodedSet]:
         """The decoded set; nothing, where no map can be had of any camera that is there."""
-        planes, reasons = self._tracks.finish(packets, jobs, self._assembler.label)
-        array, span, first = self.header.array, self.header.disparity_range_px, packets.first
-        self._tell_absent(reasons, first)
-        there = [camera for camera in array.real if camera not in reasons]
-        senders = [camera for camera in self.header.map_cameras if camera not in reasons]
-        matcher = self._matcher if self._matcher and can_be_estimated(array, there) else None
-        if not (senders or matcher):
+        self._tell_absent(tracks.reasons, tracks.first)
+        decoded = decoded_set(self.header, tracks, self._matcher)
+        if decoded is None:
             return []
-        textures = [planes[self.header.picture_track(camera)] for camera in there]
-        pictures: Mapping[Position, Picture] = OnDemand(
-            dict(zip(there, textures, strict=True)),
-            lambda _, found: to_picture(found, array.width, array.height),
-        )
-        disparities: Mapping[Position, DisparityMap]
-        if matcher is None:
-            coded = {camera: planes[Track(TrackKind.DISPARITY, camera)] for camera in senders}
-            disparities = sent_maps(self.header, coded, pictures, there)
-        else:
-            find = partial(estimate_maps, array, pictures, span, matcher)
-            disparities = MapsOnDemand(there, find)
-        if reasons:
-            pictures, disparities = fill_absent(array, pictures, disparities)
-        absent = tuple(camera for camera in array.real if camera in reasons)
-        decoded = DecodedSet(array, first.index, first.time_ns, pictures, disparities, span, absent)
         if self._layer is None or not self._layer.tracks:
             return [decoded]
-        self._waiting = WaitingSet(decoded, planes, first, {})
+        self._waiting = WaitingSet(decoded, tracks.planes, tracks.first, {})
         return []
 
-    def _tell_absent(self, reasons: dict[Position, StreamError], first: Packet) -> None:
+    def _tell_absent(self, reasons: Mapping[Position, StreamError], first: Packet) -> None:
         for camera in sorted(reasons.keys() - self._absent):
             _warn(reasons[camera], f"; the others go on without camera {view_name(camera)}")
         for camera in sorted(self._absent - reasons.keys()):

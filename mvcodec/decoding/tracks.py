@@ -49,28 +49,37 @@ class Tracks:
         return track in self._decoders or track in self._predicted
 
     def begin(
-        self, packets: PacketSet, label: Callable[[Packet], str], before: Mapping[Track, Job[Planes]]
-    ) -> dict[Track, Job[Planes]]:
+        self,
+        packets: PacketSet,
+        label: Callable[[Packet], str],
+        before: Mapping[Track, Job[Planes | None]],
+    ) -> dict[Track, Job[Planes | None]]:
         """Begin to decode every track of a frame set, side by side.
 
         Args:
             label: what to call a packet in an error.
             before: what was begun and not finished of the frame set before.
+
+        Returns:
+            By track, what will have its planes; None where its packet is missing.
         """
-        return {
-            track: submit(
-                _decode_after,
-                before.get(track),
-                self._decoders[track],
-                packet,
-                label(packet),
-            )
+        jobs = {
+            track: submit(_decode_after, before.get(track), self._decoders[track], packet, label(packet))
             for track, packet in packets.packets.items()
             if track in self._decoders
         }
+        for track in packets.missing:
+            if track in self._decoders:
+                jobs[track] = submit(_lose_after, before.get(track), self._decoders[track])
+            else:
+                self._predicted[track].lost = True
+        return jobs
 
     def finish(
-        self, packets: PacketSet, jobs: Mapping[Track, Job[Planes]], label: Callable[[Packet], str]
+        self,
+        packets: PacketSet,
+        jobs: Mapping[Track, Job[Planes | None]],
+        label: Callable[[Packet], str],
     ) -> tuple[dict[Track, Planes], dict[Position, StreamError]]:
         """Decode what is left of a frame set that was begun.
 
@@ -88,14 +97,16 @@ class Tracks:
         planes: dict[Track, Planes] = {}
         reasons: dict[Position, StreamError] = {}
         for track in packets.missing:
-            (self._decoders.get(track) or self._predicted[track]).lost = True
             name = label(replace(packets.first, track=track))
             _note(reasons, track, StreamError(name, "no packet", "one for each track of a frame set"))
         for track, job in jobs.items():
             try:
-                planes[track] = job.result()
+                found = job.result()
             except MissingReference as error:
                 _note(reasons, track, error)
+            else:
+                if found is not None:
+                    planes[track] = found
         if self._predicted and self._header is not None:
             self._predict(self._header, packets, label, planes, reasons)
         return planes, reasons
@@ -126,10 +137,18 @@ class Tracks:
                 frame.add(each.camera, found)
 
 
-def _decode_after(before: Job[Planes] | None, decoder: TrackDecoder, packet: Packet, label: str) -> Planes:
+def _decode_after(
+    before: Job[Planes | None] | None, decoder: TrackDecoder, packet: Packet, label: str
+) -> Planes | None:
     if before is not None:
         settle([before])
     return decoder.push(packet.data, packet.keyframe, label, packet.index)
+
+
+def _lose_after(before: Job[Planes | None] | None, decoder: TrackDecoder) -> None:
+    if before is not None:
+        settle([before])
+    decoder.lost = True
 
 
 def _predictions(frame: FramePrediction, predicted: PredictedCamera) -> list[Planes]:
