@@ -48,7 +48,7 @@ def test_a_quality_that_synthesis_cannot_reach_is_told(folder: Path) -> None:
 def test_the_command_codes_with_what_it_finds(folder: Path, tmp_path: Path) -> None:
     options = ("--matcher", "sgbm", "--preset", "ultrafast", "--disparity-range", "0,12")
     out = tmp_path / "x.mcap"
-    said = succeeds("encode", folder, out, "--target-psnr", "30", "--enhance", "auto", *options)
+    said = succeeds("encode", folder, out, "--target-psnr", "30", *options)
     qp = read_info(out).header.settings["qp"]
     assert f"QP {qp}: 30." in said or f"QP {qp}: 31." in said
     assert "not allowed with" in fails(2, "encode", folder, out, "-y", "--target-psnr", "30", "--qp", "3")

@@ -9,13 +9,14 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from mvcodec.array import CameraArray
 from mvcodec.capture import ArraySource, open_input, resolve_frames
 from mvcodec.capture.manifest import read_calibration
 from mvcodec.capture.recording_files import recording_files
 from mvcodec.capture.selection import CORNERS
-from mvcodec.cli.arguments import DEFAULT_SYNTHESIZER, add_frames, add_output_options
+from mvcodec.cli.arguments import add_frames, add_output_options
 from mvcodec.cli.coding_options import (
     add_coding,
     add_input,
@@ -42,7 +43,8 @@ from mvcodec.cli.live_options import input_or_camera, is_live
 from mvcodec.cli.live_view_option import add_live_view, live_view
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.picture_options import add_picture_options, reading_of
-from mvcodec.cli.progress import CodingProgress, progress, stage
+from mvcodec.cli.progress import CodingProgress, stage
+from mvcodec.cli.quality_target import config_for_quality
 from mvcodec.cli.rig_option import add_rig, rectified_source
 from mvcodec.cli.safety import add_chunk_ms
 from mvcodec.cli.segment_options import add_segment, check_continues, plan
@@ -59,7 +61,6 @@ from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
 from mvcodec.evaluation.target_setting import QualityTarget
 from mvcodec.output.live_view import LiveView
 from mvcodec.settings import settings_of
-from mvcodec.synthesis.synthesizers import make_synthesizer
 from mvcodec.video.codec import RateControl
 
 SUFFIX = ".mcap"
@@ -113,11 +114,11 @@ def run(arguments: argparse.Namespace) -> None:
         arguments.input = [file for path in arguments.input for file in recording_files(path)]
     _check_output(arguments.output, arguments.input, overwrite=arguments.overwrite or arguments.dry_run)
     _check_effect(arguments)
-    writer = (
-        encode_stream(arguments, lambda array: _config(array, arguments))
-        if is_stream(arguments)
-        else _encode_files(arguments)
-    )
+    chosen: dict[str, Any] = {}
+    if is_stream(arguments):
+        writer: McapWriter | None = encode_stream(arguments, lambda array: _config(array, arguments))
+    else:
+        writer, chosen = _encode_files(arguments)
     if writer is None:
         return
     if isinstance(writer, TalliedWriter):
@@ -126,9 +127,8 @@ def run(arguments: argparse.Namespace) -> None:
         return
     info = read_info(arguments.output)
     if arguments.json:
-        print(
-            json.dumps(document(info, arguments.output) | {"simulcast_bits_estimated": simulcast_bits(info)})
-        )
+        more = {"simulcast_bits_estimated": simulcast_bits(info)} | ({"chosen": chosen} if chosen else {})
+        print(json.dumps(document(info, arguments.output) | more))
     elif not arguments.quiet:
         print(f"{arguments.output}: {summary(info)}{_beside_simulcast(info)}")
 
@@ -158,7 +158,8 @@ def _check_effect(arguments: argparse.Namespace) -> None:
         raise SettingError(option, "with a recording or a stream", "an array folder or videos")
 
 
-def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
+def _encode_files(arguments: argparse.Namespace) -> tuple[McapWriter | None, dict[str, Any]]:
+    """Code an array folder or videos; returns the writer, and what was chosen for a quality asked for."""
     source: ArraySource = _open(arguments)
     chosen = resolve_frames(arguments.frames, source.frame_count, source.name)
     load_kernels_beside()
@@ -195,26 +196,13 @@ def _encode_files(arguments: argparse.Namespace) -> McapWriter | None:
     del first  # its memory is as large as what is coded next
     if arguments.dry_run:
         print(plan(array, config, chosen, range_px))
-        return None
+        return None, {}
     config = replace(config, disparity_range_px=range_px)
+    found: dict[str, Any] = {}
     if arguments.target_psnr is not None:
-        config = _config_for_quality(source, chosen, config, arguments)
+        config, found = config_for_quality(source, chosen, config, arguments)
     with live_view(arguments) as view:
-        return _encode(source, array, chosen, config, arguments, view)
-
-
-def _config_for_quality(
-    source: ArraySource, chosen: range, config: EncoderConfig, arguments: argparse.Namespace
-) -> EncoderConfig:
-    """The settings with the QP that --target-psnr asks for."""
-    from mvcodec.evaluation.target_quality import qp_for_quality
-
-    synthesizer = make_synthesizer(DEFAULT_SYNTHESIZER)
-    with progress("look for the QP", None, quiet=arguments.quiet, unit="coding") as bar:
-        found = qp_for_quality(source, chosen, config, arguments.target_psnr, synthesizer, bar.update)
-    if not arguments.quiet and not arguments.json:
-        print(f"QP {found.qp}: {found.psnr_y:.2f} dB, found by coding 2 frame sets {found.codings} times")
-    return replace(config, qp=found.qp)
+        return _encode(source, array, chosen, config, arguments, view), found
 
 
 def _open(arguments: argparse.Namespace) -> ArraySource:

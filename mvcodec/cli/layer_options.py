@@ -32,9 +32,9 @@ def add_no_enhancement(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _qp(text: str) -> int | str:
+def _qp(text: str) -> float | str:
     try:
-        return text if text == AUTO else int(text)
+        return text if text == AUTO else float(text) if "." in text else int(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"found {text!r}, expected a QP or {AUTO}") from None
 

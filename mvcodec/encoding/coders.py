@@ -60,17 +60,11 @@ class Coders:
         self._predicted: PredictedCameras | None = None
         if header.predicted:
             assert config.quality is not None
-            quantizer = predicted_quantizer(config.quality, self._codec, CAMERA_LINE)
+            quantizer = round(predicted_quantizer(config.quality, self._codec, CAMERA_LINE))
             self._predicted = PredictedCameras(header, self._codec, quantizer, config.chosen_preset)
         self._enhancer: Enhancer | None = None
         if layer_views:
-            quality = config.layer_quality(len(layer_views), len(array.real))
-            assert quality is not None
-            assert config.enhance is not None
-            quantizer = predicted_quantizer(quality, self._codec, LAYER_LINE)
-            self._enhancer = Enhancer(
-                header, layer_views, quantizer, config.chosen_preset, config.enhance, config.enhance_chain
-            )
+            self._enhancer = enhancer(header, config, layer_views)
 
     def push(
         self,
@@ -155,6 +149,19 @@ class Coders:
 
     def _code(self, track: Track, planes: Planes, keyframe: bool) -> list[CodedPicture]:
         return self._encoders[track].push(planes, keyframe)
+
+
+def enhancer(header: StreamHeader, config: EncoderConfig, views: Sequence[Position]) -> Enhancer:
+    """What codes the layer that settings ask for, beside a base of that header.
+
+    Raises:
+        LibvpxMissing: there is no libvpx.
+    """
+    quality = config.layer_quality(len(views), len(header.array.real))
+    assert quality is not None
+    assert config.enhance is not None
+    quantizer = predicted_quantizer(quality, find_codec(config.codec), LAYER_LINE)
+    return Enhancer(header, views, quantizer, config.chosen_preset, config.enhance, config.enhance_chain)
 
 
 def _packet(track: Track, frames: FrameSet, picture: CodedPicture) -> Packet:

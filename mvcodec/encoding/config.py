@@ -120,11 +120,12 @@ class EncoderConfig:
         " viewer, and readers of format version 1 refuse the file",
         choices=PREDICTIONS,
     )
-    enhance: int | str | None = setting(
+    enhance: float | str | None = setting(
         None,
         "add an enhancement layer: virtual views whose originals are in the input, coded from their synthesis"
-        " with about the quality of this QP; the base stays as it is without. auto: what goes best with the"
-        " pictures' quantiser; beside a bit rate both together hold it",
+        " with about the quality of this QP, which may have a fraction; the base stays as it is without."
+        " auto: what goes best with the pictures' quantiser; beside a bit rate both together hold it; for a"
+        " quality asked for both are chosen together",
     )
     enhance_views: tuple[Position, ...] | None = setting(
         None,
@@ -155,9 +156,7 @@ class EncoderConfig:
         if any(value is not None for value in (qp, crf, bitrate_kbps)):
             object.__setattr__(self, "rate", RateControl(qp, crf, bitrate_kbps))
         check_qp("disparity_qp", self.disparity_qp, max_qp)
-        if isinstance(self.enhance, str) and self.enhance != AUTO:
-            raise SettingError("enhance", self.enhance, f"a QP, or {AUTO}")
-        check_qp("enhance", None if isinstance(self.enhance, str) else self.enhance, max_qp)
+        self._check_enhance(max_qp)
         self.rate.check_scale(max_qp)
         check_settings(self)
         if self.keyframe_ratio is not None and self.codec not in RATIO_CODECS:
@@ -168,6 +167,14 @@ class EncoderConfig:
         span = self.disparity_range_px
         if span is not None and not (math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]):
             raise SettingError("disparity_range_px", list(span), "lo < hi")
+
+    def _check_enhance(self, max_qp: int) -> None:
+        asked = self.enhance
+        if isinstance(asked, str) and asked != AUTO:
+            raise SettingError("enhance", asked, f"a QP, or {AUTO}")
+        if isinstance(asked, float) and not 1 <= asked <= max_qp:
+            raise SettingError("enhance", asked, f"1..{max_qp}, or {AUTO}")
+        check_qp("enhance", asked if isinstance(asked, int) else None, max_qp)
 
     @classmethod
     def names(cls) -> tuple[str, ...]:

@@ -80,13 +80,13 @@ def layer_order(
     return tuple(order)
 
 
-def view_quantizers(header: EnhancementHeader, quantizer: int) -> dict[Position, int]:
+def view_quantizers(header: EnhancementHeader, quantizer: float) -> dict[Position, int]:
     """The quantizer, 1..63, of each view of a layer: the more others build on it, the finer.
 
     What such a view has that synthesis missed is in the predictions of all those: its bits serve them too.
 
     Args:
-        quantizer: the mean over the views, but for rounding and the ends of the scale.
+        quantizer: the mean over the views, but for rounding each and the ends of the scale.
     """
     views = [each.view for each in header.views]
     needed = [each.view for view in views for each in header.needed([view]) if each.view != view]
@@ -115,9 +115,9 @@ class Enhancer:
         self,
         header: StreamHeader,
         views: Sequence[Position],
-        quantizer: int,
+        quantizer: float,
         preset: str,
-        asked: int | str,
+        asked: float | str,
         most: int | None = None,
     ) -> None:
         size = even_size(header.array.width, header.array.height)

@@ -44,15 +44,15 @@ def prediction_order(array: CameraArray) -> tuple[PredictedCamera, ...]:
     return tuple(found)
 
 
-def predicted_quantizer(quality: float, codec: Codec, line: tuple[float, float]) -> int:
-    """The quantizer, 1..63, of predicted pictures for a QP or CRF on the codec's own scale.
+def predicted_quantizer(quality: float, codec: Codec, line: tuple[float, float]) -> float:
+    """The quantizer, 1..63, not rounded, of predicted pictures for a QP or CRF on the codec's own scale.
 
     Args:
         line: CAMERA_LINE or LAYER_LINE.
     """
     slope, offset = codec.qp_line
     of_x264 = (quality - offset) / slope
-    return min(max(round(line[0] * of_x264 + line[1]), 1), MAX_QUANTIZER)
+    return min(max(line[0] * of_x264 + line[1], 1.0), float(MAX_QUANTIZER))
 
 
 class PredictedCameras:

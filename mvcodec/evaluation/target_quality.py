@@ -71,7 +71,7 @@ def qp_for_quality(
             found[qp] = point.quality.psnr_y.all
             on_coding()
             low, high = (qp + 1, high) if found[qp] >= target_db else (low, qp - 1)
-            qp = min(max(_guess(found, target_db, codec.qp_line[0]), low), high)
+            qp = min(max(guessed_qp(found, target_db, codec.qp_line[0]), low), high)
     reached = [qp for qp, decibel in found.items() if decibel >= target_db]
     if not reached:
         best = max(found.values())
@@ -79,8 +79,13 @@ def qp_for_quality(
     return FoundQp(max(reached), found[max(reached)], len(found))
 
 
-def _guess(found: dict[int, float], target_db: float, scale: float) -> int:
-    """Where the line through the two points nearest to the target has the target's quality."""
+def guessed_qp(found: dict[int, float], target_db: float, scale: float) -> int:
+    """Where the line through the two points nearest to the target has the target's quality.
+
+    Args:
+        found: dB by QP.
+        scale: QPs of the codec for one of libx264's.
+    """
     nearest = sorted(found, key=lambda qp: abs(found[qp] - target_db))[:2]
     slope = -_DB_PER_QP / scale
     if len(nearest) == 2 and found[nearest[0]] != found[nearest[1]]:

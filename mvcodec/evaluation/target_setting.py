@@ -21,7 +21,8 @@ class QualityTarget:
     target_psnr: float | None = setting(
         None,
         "the largest QP whose mean luma PSNR over all views of the grid is this or more, dB, measured on"
-        f" {PROBED_SETS} frame sets from the middle of the input, which must have the originals of all views",
+        f" {PROBED_SETS} frame sets from the middle of the input, which must have the originals of all views;"
+        " beside enhance auto: the quantisers of pictures and layer that reach it with the fewest bits",
         low=1,
         high=100,
     )
