@@ -47,18 +47,22 @@ class TrackKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """One stream of packets: the header's, or a real camera's pictures or disparity maps."""
+    """One stream of packets: the header's, or a real camera's pictures or disparity maps.
+
+    Attributes:
+        topic: of this track in the container, e.g. ``/camera/r00_c04/video``.
+    """
 
     kind: TrackKind
     camera: Position | None = None
+    topic: str = field(init=False, repr=False, compare=False)
 
-    @property
-    def topic(self) -> str:
-        """The topic of this track in the container, e.g. ``/camera/r00_c04/video``."""
-        if self.camera is None:
-            return f"/mvcodec/{self.kind.value}"
-        root = "view" if self.kind is TrackKind.ENHANCED else "camera"
-        return f"/{root}/{view_name(self.camera)}/{self.kind.value}"
+    def __post_init__(self) -> None:
+        topic = f"/mvcodec/{self.kind.value}"
+        if self.camera is not None:
+            root = "view" if self.kind is TrackKind.ENHANCED else "camera"
+            topic = f"/{root}/{view_name(self.camera)}/{self.kind.value}"
+        object.__setattr__(self, "topic", topic)  # asked for with every packet
 
 
 MAX_SEQUENCE = (1 << 32) - 1

@@ -73,7 +73,8 @@ def set_threads(count: int | None) -> None:
 @contextmanager
 def threads(count: int | None) -> Iterator[None]:
     """Compute with this many threads inside of the block; None: as outside of it."""
-    check_threads(count)
+    if count is not None:
+        check_threads(count)
     before = _scope.set(thread_count() if count is None else count)
     try:
         yield

@@ -18,9 +18,7 @@ from mvcodec.container.limits import Limits
 from mvcodec.container.records import MAGIC, parse_chunk, read_record, unpack
 from mvcodec.errors import MvCodecError
 from mvcodec.stream import StreamHeader, TrackKind
-from mvcodec.video.bits import NalError
 from mvcodec.video.codecs import CODECS
-from mvcodec.video.h264_syntax import H264Parser
 
 CORPUS = Path(__file__).parent / "fuzz_corpus"
 LIMITS = Limits(max_record_bytes=1 << 24, max_chunk_bytes=1 << 24)
@@ -73,8 +71,6 @@ def parse_header(data: bytes) -> None:
 
 def parse_nal(data: bytes) -> None:
     """Access units, the first of them a keyframe."""
-    with suppress(NalError):
-        H264Parser().push(data)
     for codec in CODECS.values():
         checker = UnitRules(codec, TrackKind.TEXTURE, (64, 48))
         for keyframe in (True, False, None):

@@ -26,6 +26,7 @@ from mvcodec.container.limits import DEFAULT_LIMITS, Limits
 from mvcodec.container.records import (
     HEAD,
     MAGIC,
+    Content,
     RecordError,
     UnknownPacking,
     chunk_places,
@@ -204,7 +205,7 @@ class FileCheck:
                 self._tell("record", f"a record of kind {opcode} inside a chunk")
         return messages
 
-    def _message(self, content: bytes) -> tuple[CheckedMessage | None, int]:
+    def _message(self, content: Content) -> tuple[CheckedMessage | None, int]:
         record = parse_message(content)
         seen, number = self._seen, record.channel_id
         self._walk.time_ns = record.log_time
@@ -225,9 +226,9 @@ class FileCheck:
             self._unknown.add(number)
             self._tell("channel", f"a message of unknown channel {number}")
 
-    def _declare(self, opcode: int, content: bytes) -> None:
+    def _declare(self, opcode: int, content: Content) -> None:
         kind = Schema if opcode == Opcode.SCHEMA else Channel
-        record = self._parsed(kind, content)
+        record = self._parsed(kind, bytes(content))
         if record is None:
             return
         known: dict[int, Any] = self._seen.schemas if opcode == Opcode.SCHEMA else self._seen.channels

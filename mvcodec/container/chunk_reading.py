@@ -78,6 +78,7 @@ class ChunkReader:
         self._index_damage = ""
         self.cut_off = self.partial = False
         self._index = self._read_index() if file.seekable() else None
+        self._file.summing = self._index is None  # chunks have checksums of their own
         if self._index is not None:
             for channel in self._index.channels.values():
                 self._declared.add(channel)

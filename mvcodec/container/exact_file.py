@@ -15,19 +15,22 @@ class ExactFile:
 
     Attributes:
         count: bytes taken from the input, repeated ones counted again.
-        crc: CRC-32 of what `read` and `skip` returned since the start, in sequence.
+        summing: whether to keep the checksum.
+        crc: CRC-32 of what `read` and `skip` returned since the last `seek`, in sequence.
     """
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
         self._returned = b""
         self.count = 0
-        self.crc = 0
+        self.summing, self.crc = True, 0
 
     def read(self, size: int) -> bytes:
         """`size` bytes; fewer only at the end of the input."""
-        data, self._returned = self._returned[:size], self._returned[size:]
-        pieces, got = [data], len(data)
+        pieces, got = [], 0
+        if self._returned:
+            data, self._returned = self._returned[:size], self._returned[size:]
+            pieces, got = [data], len(data)
         while got < size:
             piece = self._file.read(min(size - got, _PIECE_BYTES))  # an unbuffered pipe gives what it has
             if not piece:
@@ -35,8 +38,9 @@ class ExactFile:
             self.count += len(piece)
             pieces.append(piece)
             got += len(piece)
-        data = b"".join(pieces)
-        self.crc = zlib.crc32(data, self.crc)
+        data = pieces[0] if len(pieces) == 1 else b"".join(pieces)
+        if self.summing:
+            self.crc = zlib.crc32(data, self.crc)
         return data
 
     def skip(self, size: int) -> bool:

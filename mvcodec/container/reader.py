@@ -64,6 +64,7 @@ class McapReader(Closing):
         if self._chunks.indexed and HEADER_TRACK.topic not in self._chunks.topics:
             raise self._headless()
         self._rest = self._chunks.chunks()
+        self._first: list[TopicMessage] | None = None
         self.header = StreamHeader.from_json(self._first_header().data, name)
         limits.check_header(self.header, name)
         depths = [Track(TrackKind.DEPTH, camera) for camera in self.header.array.real] if depth else []
@@ -190,7 +191,7 @@ class McapReader(Closing):
         if self._chunks.indexed:
             self._gap = False
             first_ns, number = self._keyframe_before(start)
-            chunks = self._chunks.chunks(self._chunks.chunk_at(first_ns), self._time_of(stop))
+            chunks = self._from_chunk(self._chunks.chunk_at(first_ns), self._time_of(stop))
         index = self.header.first_frame + number
         last: Packet | None = None
         keyframe = False
@@ -220,14 +221,24 @@ class McapReader(Closing):
         if self._owned is not None:
             self._owned.close()
 
+    def _from_chunk(self, number: int, end_ns: int | None) -> Iterator[list[TopicMessage]]:
+        """The chunks of an indexed file from one on; the first is at hand once: it has the header."""
+        first, self._first = self._first, None
+        if number > 0 or first is None:
+            return self._chunks.chunks(number, end_ns)
+        return chain([first], self._chunks.chunks(1, end_ns))
+
     def _first_header(self) -> Message:
         """The first header's message; what was read with it stays to be read."""
-        for chunk in self._rest:
+        for number, chunk in enumerate(self._rest):
             for position, (topic, message) in enumerate(chunk):
                 if topic == HEADER_TRACK.topic:
                     self._limits.check("max_header_bytes", len(message.data), f"{self.name}: header bytes")
-                    remaining: list[TopicMessage] = chunk[position:]
-                    self._rest = chain([remaining], self._rest)
+                    if not self._chunks.indexed:
+                        remaining: list[TopicMessage] = chunk[position:]
+                        self._rest = chain([remaining], self._rest)
+                    elif number == 0 and not self._gap:
+                        self._first = chunk
                     return message
         raise self._headless()
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import lz4.frame
 import zstandard
-from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Schema
@@ -29,6 +28,17 @@ _CHUNK_HEAD = struct.Struct("<QQQII")
 
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time."""
+
+_CHANNEL_HEAD = struct.Struct("<HH")
+"""Channel, schema."""
+
+_SCHEMA_HEAD = struct.Struct("<H")
+
+_LENGTH = struct.Struct("<I")
+"""Before text, bytes and tables."""
+
+Content = bytes | memoryview
+"""Of a record, by itself or inside of its chunk."""
 
 _ZSTD = b"\x04\x00\x00\x00zstd"
 _ZSTD_AT = HEAD.size + _CHUNK_HEAD.size - 4
@@ -151,8 +161,8 @@ class ChunkHead:
     compression: str
 
 
-def parse_chunk(content: bytes, limits: Limits, *, whole: bool = True) -> tuple[ChunkHead, bytes]:
-    """Head and packed data of a chunk; with `whole` false, of one that breaks off.
+def parse_chunk(content: bytes, limits: Limits, *, whole: bool = True) -> tuple[ChunkHead, memoryview]:
+    """Head and packed data (inside of `content`) of a chunk; with `whole` false, of one that breaks off.
 
     Raises:
         FramingError: its length is wrong.
@@ -170,22 +180,24 @@ def parse_chunk(content: bytes, limits: Limits, *, whole: bool = True) -> tuple[
     if size > limits.max_chunk_bytes:
         raise RecordError(f"a chunk of {size} bytes, more than max_chunk_bytes = {limits.max_chunk_bytes}")
     at = _CHUNK_HEAD.size + len(name)
-    data = content[at + 8 :]
+    data = memoryview(content)[at + 8 :]
     if whole and content[at : at + 8] != struct.pack("<Q", len(data)):
         raise FramingError("a chunk whose lengths disagree")
     return ChunkHead(start_ns, end_ns, size, crc, name.decode()), data
 
 
-def unpack(head: ChunkHead, data: bytes, limits: Limits, *, whole: bool = True) -> bytes:
+def unpack(head: ChunkHead, packed: memoryview, limits: Limits, *, whole: bool = True) -> bytes:
     """The records of a chunk; with `whole` false, those of a chunk that breaks off.
 
     Raises:
         RecordError: the data are damaged, or larger than they say.
     """
     if head.compression == "zstd":
-        data = _decompress(data, head.size, limits, whole=whole)
+        data = _decompress(packed, head.size, limits, whole=whole)
     elif head.compression == "lz4":
-        data = _decompress_lz4(data, head.size)
+        data = _decompress_lz4(packed, head.size)
+    else:
+        data = bytes(packed)
     if whole and len(data) != head.size:
         raise RecordError(f"a chunk of {len(data)} bytes that announces {head.size}")
     if whole and head.crc and zlib.crc32(data) != head.crc:
@@ -193,22 +205,24 @@ def unpack(head: ChunkHead, data: bytes, limits: Limits, *, whole: bool = True) 
     return data
 
 
-def _decompress(data: bytes, size: int, limits: Limits, *, whole: bool) -> bytes:
+def _decompress(data: memoryview, size: int, limits: Limits, *, whole: bool) -> bytes:
     try:
-        announced = zstandard.frame_content_size(data) if whole else 0
+        announced = zstandard.frame_content_size(data) if whole else -1
         if announced > limits.max_chunk_bytes:
             raise RecordError(
                 f"a chunk of {announced} bytes, more than max_chunk_bytes = {limits.max_chunk_bytes}"
             )
         # The window is bounded too: it may be larger than what it unpacks to.
         unpacker = zstandard.ZstdDecompressor(max_window_size=1 << 27)
+        if announced == size:
+            return unpacker.decompress(data)  # at once, without a window's memory
         with unpacker.stream_reader(io.BytesIO(data)) as stream:
             return stream.read(size + 1)
     except zstandard.ZstdError as error:
         raise RecordError(f"a chunk that cannot be unpacked: {error}") from None
 
 
-def _decompress_lz4(data: bytes, size: int) -> bytes:
+def _decompress_lz4(data: memoryview, size: int) -> bytes:
     """At most one byte more than announced, whatever the data would unpack to."""
     unpacker = lz4.frame.LZ4FrameDecompressor()
     try:
@@ -217,19 +231,19 @@ def _decompress_lz4(data: bytes, size: int) -> bytes:
         raise RecordError(f"a chunk that cannot be unpacked: {error}") from None
 
 
-def chunk_places(data: bytes, *, whole: bool = True) -> Iterator[tuple[int, bytes, int]]:
-    """Opcode, content and offset of each record of an unpacked chunk.
+def chunk_places(data: bytes, *, whole: bool = True) -> Iterator[tuple[int, memoryview, int]]:
+    """Opcode, content (inside of `data`) and offset of each record of an unpacked chunk.
 
     Raises:
         RecordError: the end is inside a record; with `whole` false, that ends it.
     """
-    at = 0
+    at, within = 0, memoryview(data)
     while at + HEAD.size <= len(data):
         opcode, size = HEAD.unpack_from(data, at)
         end = at + HEAD.size + size
         if end > len(data):
             break
-        yield opcode, data[at + HEAD.size : end], at
+        yield opcode, within[at + HEAD.size : end], at
         at = end
     if whole and at < len(data):
         raise RecordError("a chunk that ends inside a record")
@@ -250,27 +264,51 @@ def chunk_records(data: bytes, *, whole: bool = True) -> Iterator[Schema | Chann
             yield parse_message(content)
 
 
-def parse_channel(content: bytes) -> Channel:
+def parse_channel(content: Content) -> Channel:
     """A channel record."""
     try:
-        channel: Channel = Channel.read(ReadDataStream(io.BytesIO(content)))
+        number, schema = _CHANNEL_HEAD.unpack_from(content)
+        topic, at = _text(content, _CHANNEL_HEAD.size)
+        encoding, at = _text(content, at)
+        (length,) = _LENGTH.unpack_from(content, at)
+        end, metadata, at = at + _LENGTH.size + length, dict[str, str](), at + _LENGTH.size
+        while at < end:
+            key, at = _text(content, at)
+            metadata[key], at = _text(content, at)
     except DAMAGE as error:
         raise RecordError(f"a damaged channel ({error})") from None
-    return channel
+    return Channel(number, topic, encoding, metadata, schema)
 
 
-def parse_schema(content: bytes) -> Schema:
+def parse_schema(content: Content) -> Schema:
     """A schema record."""
     try:
-        schema: Schema = Schema.read(ReadDataStream(io.BytesIO(content)))
+        (number,) = _SCHEMA_HEAD.unpack_from(content)
+        name, at = _text(content, _SCHEMA_HEAD.size)
+        encoding, at = _text(content, at)
+        data, _ = _bytes(content, at)
     except DAMAGE as error:
         raise RecordError(f"a damaged schema ({error})") from None
-    return schema
+    return Schema(number, data, encoding, name)
 
 
-def parse_message(content: bytes) -> Message:
+def parse_message(content: Content) -> Message:
     """A message record."""
     if len(content) < _MESSAGE_HEAD.size:
         raise RecordError(f"a message of {len(content)} bytes")
     channel, sequence, log_time, publish_time = _MESSAGE_HEAD.unpack_from(content)
-    return Message(channel, log_time, content[_MESSAGE_HEAD.size :], publish_time, sequence)
+    return Message(channel, log_time, bytes(content[_MESSAGE_HEAD.size :]), publish_time, sequence)
+
+
+def _bytes(content: Content, at: int) -> tuple[bytes, int]:
+    """Bytes behind their length, and the offset behind them."""
+    (length,) = _LENGTH.unpack_from(content, at)
+    start, end = at + _LENGTH.size, at + _LENGTH.size + length
+    if end > len(content):
+        raise ValueError("it ends too early")
+    return bytes(content[start:end]), end
+
+
+def _text(content: Content, at: int) -> tuple[str, int]:
+    data, end = _bytes(content, at)
+    return str(data, "utf-8"), end

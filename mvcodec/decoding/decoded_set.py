@@ -17,34 +17,42 @@ from mvcodec.stream import StreamHeader, Track, TrackKind
 from mvcodec.video.colour import to_picture
 
 
-def decoded_set(header: StreamHeader, tracks: DecodedTracks, matcher: Matcher | None) -> DecodedSet | None:
-    """The decoded set; pictures and maps are made when somebody looks at them.
+class SetMaker:
+    """Makes the decoded sets of a stream.
 
     Args:
         matcher: estimates the maps of a stream whose decoder does so; else None.
-
-    Returns:
-        None where no map can be had of any camera that is there.
     """
-    array, span, reasons = header.array, header.disparity_range_px, tracks.reasons
-    there = [camera for camera in array.real if camera not in reasons]
-    senders = [camera for camera in header.map_cameras if camera not in reasons]
-    if matcher is not None and not can_be_estimated(array, there):
-        matcher = None
-    if not (senders or matcher):
-        return None
-    textures = [tracks.planes[header.picture_track(camera)] for camera in there]
-    pictures: Mapping[Position, Picture] = OnDemand(
-        dict(zip(there, textures, strict=True)),
-        lambda _, found: to_picture(found, array.width, array.height),
-    )
-    disparities: Mapping[Position, DisparityMap]
-    if matcher is None:
-        coded = {camera: tracks.planes[Track(TrackKind.DISPARITY, camera)] for camera in senders}
-        disparities = sent_maps(header, coded, pictures, there)
-    else:
-        disparities = MapsOnDemand(there, partial(estimate_maps, array, pictures, span, matcher))
-    if reasons:
-        pictures, disparities = fill_absent(array, pictures, disparities)
-    absent = tuple(camera for camera in array.real if camera in reasons)
-    return DecodedSet(array, tracks.first.index, tracks.first.time_ns, pictures, disparities, span, absent)
+
+    def __init__(self, header: StreamHeader, matcher: Matcher | None) -> None:
+        self._header, self._matcher = header, matcher
+        self._pictures = {camera: header.picture_track(camera) for camera in header.array.real}
+        self._maps = {camera: Track(TrackKind.DISPARITY, camera) for camera in header.map_cameras}
+
+    def make(self, tracks: DecodedTracks) -> DecodedSet | None:
+        """A decoded set, whose pictures and maps are made when somebody looks at them.
+
+        Returns:
+            None where no map can be had of any camera that is there.
+        """
+        header, first, planes, reasons = self._header, tracks.first, tracks.planes, tracks.reasons
+        array, span = header.array, header.disparity_range_px
+        coded = {camera: planes[track] for camera, track in self._pictures.items() if camera not in reasons}
+        maps = {camera: planes[track] for camera, track in self._maps.items() if camera not in reasons}
+        matcher = self._matcher
+        if matcher is not None and not can_be_estimated(array, [*coded]):
+            matcher = None
+        if not (maps or matcher):
+            return None
+        pictures: Mapping[Position, Picture] = OnDemand(
+            coded, lambda _, found: to_picture(found, array.width, array.height)
+        )
+        disparities: Mapping[Position, DisparityMap]
+        if matcher is None:
+            disparities = sent_maps(header, maps, pictures, [*coded])
+        else:
+            disparities = MapsOnDemand([*coded], partial(estimate_maps, array, pictures, span, matcher))
+        if reasons:
+            pictures, disparities = fill_absent(array, pictures, disparities)
+        absent = tuple(camera for camera in self._pictures if camera in reasons)
+        return DecodedSet(array, first.index, first.time_ns, pictures, disparities, span, absent)

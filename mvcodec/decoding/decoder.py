@@ -13,7 +13,7 @@ from mvcodec.closing import Closing
 from mvcodec.container import McapReader
 from mvcodec.container.assembly import Assembler, PacketSet
 from mvcodec.container.limits import DEFAULT_LIMITS, Limits
-from mvcodec.decoding.decoded_set import decoded_set
+from mvcodec.decoding.decoded_set import SetMaker
 from mvcodec.decoding.enhanced_views import EnhancedViews, WaitingSet
 from mvcodec.decoding.estimated_maps import (
     decoding_matcher,
@@ -76,7 +76,7 @@ class Decoder(Closing):
     ) -> None:
         ON_ERROR.check(on_error)
         self._on_error, self._limits, self._asked_matcher = on_error, limits, matcher
-        self._matcher: Matcher | None = None
+        self._maker: SetMaker | None = None
         self._header: StreamHeader | None = None
         self._tracks = Tracks()
         self._absent: frozenset[Position] = frozenset()
@@ -181,9 +181,12 @@ class Decoder(Closing):
                     # A frame set comes out while the one after those begun behind it is read, at the latest.
                     numbers = dict([*numbers.items()][-AHEAD - 1 :]) | {packet.index: number}
                 # Before the header is pushed, so that none is lost with an error of a later one.
-                begun = self._finish_begun() if packet.track.kind is TrackKind.HEADER else ()
-                yield from (each for each in begun if numbers.get(each.index, number) >= start)
-                yield from (each for each in self.push(packet) if numbers.get(each.index, number) >= start)
+                if packet.track.kind is TrackKind.HEADER:
+                    begun = self._finish_begun()
+                    yield from (each for each in begun if numbers.get(each.index, number) >= start)
+                for decoded in self.push(packet):
+                    if numbers.get(decoded.index, number) >= start:
+                        yield decoded
             if not self._reader.cut_off:
                 rest = self._decode_all(self._assembler.flush())
                 yield from (each for each in rest if numbers.get(each.index, number) >= start)
@@ -254,7 +257,7 @@ class Decoder(Closing):
         self._limits.check_header(header, self._name)
         tracks = Tracks(header, self._name)
         estimates = header.estimates_maps
-        self._matcher = decoding_matcher(header, self._asked_matcher) if estimates else None
+        self._maker = SetMaker(header, decoding_matcher(header, self._asked_matcher) if estimates else None)
         self._header = header
         self._tracks = tracks
         self._assembler.start(header.tracks)
@@ -327,7 +330,7 @@ class Decoder(Closing):
     def _finish(self, tracks: DecodedTracks) -> list[DecodedSet]:
         """The decoded set; nothing, where no map can be had of any camera that is there."""
         self._tell_absent(tracks.reasons, tracks.first)
-        decoded = decoded_set(self.header, tracks, self._matcher)
+        decoded = None if self._maker is None else self._maker.make(tracks)
         if decoded is None:
             return []
         if self._layer is None or not self._layer.tracks:

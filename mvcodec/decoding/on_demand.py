@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
 from typing import Generic, TypeVar
 
 from mvcodec.array import Position
@@ -25,16 +25,18 @@ class OnDemand(Mapping[Position, Made], Generic[Coded, Made]):
     """
 
     def __init__(self, coded: Mapping[Position, Coded], make: Callable[[Position, Coded], Made]) -> None:
-        self._cameras = tuple(coded)
-        self._waiting = {camera: Job(partial(make, camera, found), ()) for camera, found in coded.items()}
-        self._made: dict[Position, Made] = {}
+        self._cameras, self._coded, self._make = tuple(coded), dict(coded), make
+        self._jobs: dict[Position, Job[Made]] = {}
+        self._lock = threading.Lock()
 
     def __getitem__(self, camera: Position) -> Made:
-        job = self._waiting.get(camera)
-        if job is not None:
-            self._made[camera] = job.result()
-            self._waiting.pop(camera, None)
-        return self._made[camera]
+        job = self._jobs.get(camera)
+        if job is None:
+            with self._lock:
+                if camera not in self._jobs:
+                    self._jobs[camera] = Job(self._make, (camera, self._coded.pop(camera)))
+            job = self._jobs[camera]
+        return job.result()
 
     def __contains__(self, camera: object) -> bool:
         return camera in self._cameras

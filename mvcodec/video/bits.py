@@ -47,12 +47,11 @@ class BitReader:
 
     def ue(self) -> int:
         """An unsigned Exp-Golomb number: ue(v)."""
-        zeros = 0
-        while not self.u(1):
-            zeros += 1
-            if zeros > MAX_GOLOMB_ZEROS:
-                raise NalError("a number of more than 32 bits")
-        return (1 << zeros) - 1 + self.u(zeros)
+        ahead = self._value & ((1 << self._left) - 1)
+        zeros = self._left - ahead.bit_length()
+        if zeros > MAX_GOLOMB_ZEROS:
+            raise NalError("a number of more than 32 bits")
+        return self.u(2 * zeros + 1) - 1
 
     def se(self) -> int:
         """A signed Exp-Golomb number: se(v)."""

@@ -92,121 +92,79 @@ class SliceHeader:
     frame_num: int | None
 
 
-@dataclass(frozen=True, slots=True)
-class AccessUnit:
-    """What one access unit holds.
-
-    Attributes:
-        sequence_sets: in order.
-        picture_sets: (pic_parameter_set_id, seq_parameter_set_id), in order.
-        slices: in order.
-        kinds: nal_unit_type of every NAL unit.
-        recovery_point: a message says that pictures shown from here on are right (D.2.8).
-    """
-
-    sequence_sets: tuple[SequenceParameters, ...]
-    picture_sets: tuple[tuple[int, int], ...]
-    slices: tuple[SliceHeader, ...]
-    kinds: tuple[int, ...]
-    recovery_point: bool = False
-
-    @property
-    def idr(self) -> bool:
-        """Whether it is an IDR picture."""
-        return any(piece.idr for piece in self.slices)
-
-    @property
-    def pictures(self) -> int:
-        """How many pictures begin in it."""
-        return sum(piece.first_block == 0 for piece in self.slices)
-
-
-class H264Parser:
-    """Parses the access units of one track in order; remembers its parameter sets."""
-
-    def __init__(self) -> None:
-        self._sequences: dict[int, SequenceParameters] = {}
-        self._pictures: dict[int, int] = {}
-
-    def push(self, data: bytes) -> AccessUnit:
-        """Parse an access unit in Annex B form.
-
-        Raises:
-            NalError: a NAL unit that breaks off or holds what the standard does not allow.
-        """
-        units = nal_units(data)
-        sequences, pictures, slices = [], [], []
-        for unit in units:
-            kind = nal_type(unit)
-            if unit[0] & 0x80:
-                raise NalError("a NAL unit with its forbidden bit set")
-            if kind == SPS:
-                sequences.append(parse_sequence(unit))
-                self._sequences[sequences[-1].number] = sequences[-1]
-            elif kind == PPS:
-                pictures.append(_picture_set(unit))
-                self._pictures[pictures[-1][0]] = pictures[-1][1]
-            elif kind in (SLICE, IDR_SLICE):
-                slices.append(self._slice(unit, kind))
-        recovery = any(nal_type(unit) == SEI and recovers_at_once(unit) for unit in units)
-        return AccessUnit(
-            tuple(sequences), tuple(pictures), tuple(slices), tuple(map(nal_type, units)), recovery
-        )
-
-    def _slice(self, unit: bytes, kind: int) -> SliceHeader:
-        bits = BitReader(payload(unit, limit=_HEAD_BYTES))
-        first, slice_type, number = bits.ue(), bits.ue() % 5, bits.ue()
-        sequence = self._sequences.get(self._pictures.get(number, -1))
-        frame_num = None if sequence is None else bits.u(sequence.frame_num_bits)
-        return SliceHeader(first, slice_type, number, kind == IDR_SLICE, bool(unit[0] & 0x60), frame_num)
-
-    def sequence_of(self, piece: SliceHeader) -> SequenceParameters | None:
-        """The parameters of a slice's sequence; None where they are not known."""
-        return self._sequences.get(self._pictures.get(piece.picture_set, -1))
-
-
 class H264Units:
     """Reads access units: their rules, and their frame_num (7.4.3)."""
 
     def __init__(self) -> None:
-        self._parser = H264Parser()
+        self._sequences: dict[int, SequenceParameters] = {}
+        self._picture_sets: dict[int, int] = {}
         self._next: int | None = None
         self._last: int | None = None
 
     def push(self, data: bytes) -> UnitFacts:
         """See `UnitReader`."""
-        unit = self._parser.push(data)
         broken = [] if begins_with_start_code(data) else [("annex-b", "no start code at its beginning")]
-        if any(piece.kind == B_SLICE for piece in unit.slices):
+        kinds, recovery, slices, sequences = set(), False, [], []
+        for unit in nal_units(data):
+            if unit[0] & 0x80:
+                raise NalError("a NAL unit with its forbidden bit set")
+            kind = nal_type(unit)
+            kinds.add(kind)
+            if kind in (SLICE, IDR_SLICE):
+                slices.append(self._slice(unit, kind))
+            elif kind == SPS:
+                sequences.append(parse_sequence(unit))
+                self._sequences[sequences[-1].number] = sequences[-1]
+            elif kind == PPS:
+                number, sequence = _picture_set(unit)
+                self._picture_sets[number] = sequence
+            elif kind == SEI:
+                recovery = recovery or recovers_at_once(unit)
+        slice_kinds = {piece.kind for piece in slices}
+        if B_SLICE in slice_kinds:
             broken.append(("b-frames", "a B slice"))
-        if _PARTITIONS & set(unit.kinds):
+        if not _PARTITIONS.isdisjoint(kinds):
             broken.append(("partition", "data partitions"))
-        missing = None
-        for piece in (piece for piece in unit.slices if piece.first_block == 0):
-            sequence = self._parser.sequence_of(piece)
-            if sequence is None or piece.frame_num is None:
-                broken.append(("parameter-sets", "a slice whose parameter sets never came"))
-                continue
-            # The second field of a frame has the number of the first.
-            legal = {self._next} if sequence.progressive else {self._next, self._last}
-            if not piece.idr and self._next is None:
-                missing = "a picture before the first keyframe"
-            elif not piece.idr and piece.frame_num not in legal:
-                missing = f"frame_num {piece.frame_num}, expected {self._next}"
-            self._last = piece.frame_num
-            top = 1 << sequence.frame_num_bits
-            self._next = (piece.frame_num + 1) % top if piece.reference else piece.frame_num
-        alone = bool(unit.slices) and all(piece.kind == I_SLICE for piece in unit.slices)
+        missing, pictures = None, 0
+        for piece in slices:
+            if piece.first_block == 0:
+                pictures += 1
+                missing = self._picture(piece, broken) or missing
         return UnitFacts(
-            keyframe=unit.idr,
-            pictures=unit.pictures,
-            parameters={SPS, PPS} <= set(unit.kinds),
-            sizes=tuple((found.width, found.height) for found in unit.sequence_sets),
-            sequences=tuple(map(_facts, unit.sequence_sets)),
+            keyframe=IDR_SLICE in kinds,
+            pictures=pictures,
+            parameters=SPS in kinds and PPS in kinds,
+            sizes=tuple([(found.width, found.height) for found in sequences]),
+            sequences=tuple([_facts(found) for found in sequences]),
             broken=tuple(broken),
             missing=missing,
-            recovers=alone and unit.recovery_point,
+            recovers=recovery and slice_kinds == {I_SLICE},
         )
+
+    def _slice(self, unit: bytes, kind: int) -> SliceHeader:
+        bits = BitReader(payload(unit, limit=_HEAD_BYTES))
+        first, slice_type, number = bits.ue(), bits.ue() % 5, bits.ue()
+        sequence = self._sequences.get(self._picture_sets.get(number, -1))
+        frame_num = None if sequence is None else bits.u(sequence.frame_num_bits)
+        return SliceHeader(first, slice_type, number, kind == IDR_SLICE, bool(unit[0] & 0x60), frame_num)
+
+    def _picture(self, piece: SliceHeader, broken: list[tuple[str, str]]) -> str | None:
+        """What a picture builds on that never came; `piece` is its first slice."""
+        sequence = self._sequences.get(self._picture_sets.get(piece.picture_set, -1))
+        if sequence is None or piece.frame_num is None:
+            broken.append(("parameter-sets", "a slice whose parameter sets never came"))
+            return None
+        missing = None
+        # The second field of a frame has the number of the first.
+        legal = (self._next,) if sequence.progressive else (self._next, self._last)
+        if not piece.idr and self._next is None:
+            missing = "a picture before the first keyframe"
+        elif not piece.idr and piece.frame_num not in legal:
+            missing = f"frame_num {piece.frame_num}, expected {self._next}"
+        self._last = piece.frame_num
+        top = 1 << sequence.frame_num_bits
+        self._next = (piece.frame_num + 1) % top if piece.reference else piece.frame_num
+        return missing
 
 
 def _facts(found: SequenceParameters) -> Sequence:
