@@ -44,6 +44,14 @@ def test_a_speck_takes_what_is_around_and_a_larger_piece_stays(height: float) ->
     assert (found[:10] == 3).all()
 
 
+def test_specks_side_by_side_are_smoothed_over_as_one() -> None:
+    disparity = np.full((30, 30), 3, np.float32)
+    disparity[10:18, 10:18] = 12
+    disparity[10:18:2, 10:18] = 20
+    disparity[13, 13] = 40
+    assert (smoothed(disparity) == 3).all()
+
+
 def test_a_slanted_wire_is_one_piece_and_stays() -> None:
     disparity = np.full((60, 60), 3, np.float32)
     disparity[np.arange(40) + 5, np.arange(40) + 8] = 12

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -281,30 +281,45 @@ def median3(disparity: FloatMap) -> FloatMap:
     return np.asarray(np.median(windows, axis=(2, 3)), np.float32)
 
 
+Place = tuple[int, int]
+
+
 def smooth_over(disparity: FloatMap, step: float, reach: int, fewest: int) -> FloatMap:
     height, width = disparity.shape
-    out, met = disparity.copy(), set[tuple[int, int]]()
+    out = disparity.copy()
 
-    def near(place: tuple[int, int], far: int) -> list[tuple[int, int]]:
+    def near(place: Place, far: int) -> list[Place]:
         y, x = place
         rows, columns = range(max(y - far, 0), min(y + far + 1, height)), range(max(x - far, 0), x + far + 1)
         return [(v, u) for v in rows for u in columns if u < width]
 
-    def alike(one: tuple[int, int], other: tuple[int, int]) -> bool:
+    def alike(one: Place, other: Place) -> bool:
         return bool(abs(disparity[one] - disparity[other]) <= step)
 
-    for place in ((y, x) for y in range(height) for x in range(width)):
-        if place in met:
-            continue
-        piece = [place]
-        met.add(place)
-        for here in piece:
-            found = [there for there in near(here, reach) if there not in met and alike(here, there)]
-            met.update(found)
-            piece += found
-        around = [disparity[there] for here in piece for there in near(here, 1) if not alike(here, there)]
-        if len(piece) < fewest and around:
-            for here in piece:
+    def groups(reach: int, joined: Callable[[Place, Place], bool]) -> list[list[Place]]:
+        found, met = [], set[Place]()
+        for place in np.ndindex(height, width):
+            group = [] if place in met else [place]
+            for here in group:
+                met.add(here)
+                group += [
+                    there
+                    for there in near(here, reach)
+                    if there not in {*met, *group} and joined(here, there)
+                ]
+            found += [group] if group else []
+        return found
+
+    pieces = groups(reach, alike)
+    small = {place for piece in pieces if len(piece) < fewest for place in piece}
+
+    def together(one: Place, other: Place) -> bool:
+        return {one, other} <= small and (alike(one, other) or other in near(one, 1))
+
+    for group in groups(reach, together):
+        around = [disparity[there] for here in group for there in near(here, 1) if there not in small]
+        if group[0] in small and around:
+            for here in group:
                 out[here] = sorted(around)[len(around) // 2]
     return out
 
