@@ -69,9 +69,23 @@ class Pipeline:
             StreamError: as `push`.
         """
         begun = self._begun.popleft()
+        self._work_off(begun)
         try:
             planes, reasons = self._tracks.finish(begun.packets, begun.jobs, self._label)
         except StreamError:
             self._begun.clear()
             raise
         return DecodedTracks(begun.packets.first, planes, reasons)
+
+    def _work_off(self, first: _Begun) -> None:
+        """Decode what nobody has begun of a frame set; while others are at its last, what is behind it."""
+        for job in reversed(first.jobs.values()):
+            job.begin()
+        before = first.jobs
+        for behind in self._begun:
+            for track, job in behind.jobs.items():
+                if all(each.done for each in first.jobs.values()):
+                    return
+                if before[track].done:
+                    job.begin()
+            before = behind.jobs
