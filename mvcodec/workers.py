@@ -261,11 +261,13 @@ def run_all(function: Callable[..., Result], *items: Iterable[Any]) -> list[Resu
 
 
 def run_in_bands(length: int, work: Callable[..., object], *arguments: object) -> None:
-    """``work(*arguments, first, last)`` for bands of ``range(length)``, one a thread.
+    """``work(*arguments, first, last)`` for bands of ``range(length)``; with several threads two for each.
 
     Wherever they end, the same must come out.
     """
-    count = max(min(thread_count(), length), 1)
+    threads_here = thread_count()
+    # Some rows are more work than others: who is done with the first band takes another one.
+    count = max(min(threads_here * (2 if threads_here > 1 else 1), length), 1)
     edges = [length * band // count for band in range(count + 1)]
     run_all(partial(work, *arguments), edges[:-1], edges[1:])
 

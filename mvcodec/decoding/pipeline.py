@@ -33,7 +33,7 @@ class DecodedTracks:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Begun:
     packets: PacketSet
-    jobs: Mapping[Track, Job[Planes | None]]
+    jobs: dict[Track, Job[Planes | None]]
 
 
 class Pipeline:
