@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.frames import FloatMap, Mask, Picture
+from mvcodec.workers import run_all
 
 SMALL_WIDTH = 160
 """Width of the small copies, px, about."""
@@ -67,7 +68,8 @@ def camera_gains(
     ones = {camera: np.ones(3, np.float32) for camera in array.real}
     every = max(1, round(array.width / SMALL_WIDTH))
     small = replace(array, width=max(array.width // every, 1), height=max(array.height // every, 1))
-    shrunk = {camera: _shrunk(pictures[camera], small, every) for camera in array.real}
+    made = run_all(lambda camera: _shrunk(pictures[camera], small, every), array.real)
+    shrunk = dict(zip(array.real, made, strict=True))
     maps, confirmed = match(small, shrunk, (range_px[0] / every, range_px[1] / every))
     ratios = _ratios(small, shrunk, maps, confirmed)
     if not ratios:
@@ -91,14 +93,19 @@ def _ratios(
     confirmed: Mapping[Position, Mask],
 ) -> list[_Ratio]:
     """Of every two neighbours in a row or a column that share enough."""
-    found = []
-    for one in array.real:
-        for other in ((one[0], one[1] + array.col_step), (one[0] + array.row_step, one[1])):
-            if other != one and other in pictures:
-                logs = _logs(array, one, other, pictures, maps, confirmed[one])
-                if logs is not None:
-                    found.append(_Ratio(one, other, logs))
-    return found
+    pairs = [
+        (one, other)
+        for one in array.real
+        for other in ((one[0], one[1] + array.col_step), (one[0] + array.row_step, one[1]))
+        if other != one and other in pictures
+    ]
+
+    def logs_of(pair: tuple[Position, Position]) -> NDArray[np.float64] | None:
+        one, other = pair
+        return _logs(array, one, other, pictures, maps, confirmed[one])
+
+    logs = run_all(logs_of, pairs)
+    return [_Ratio(*pair, found) for pair, found in zip(pairs, logs, strict=True) if found is not None]
 
 
 def _logs(

@@ -130,14 +130,12 @@ class Joint:
             return dict(zip(cameras, filled, strict=True)), valid
         # What nobody confirms has no other disparities than what somebody does.
         low, levels = _levels(confirmed_range([(raw[c], valid[c]) for c in cameras], range_px))
-        completed = run_all(
-            lambda camera: self._complete(array, camera, views.grey_of(camera), raw, valid, low, levels),
-            cameras,
-        )
-        maps = {
-            camera: self._smoothed(np.clip(values, *range_px), valid[camera], range_px)
-            for camera, values in zip(cameras, completed, strict=True)
-        }
+
+        def completed(camera: Position) -> FloatMap:
+            found = self._complete(array, camera, views.grey_of(camera), raw, valid, low, levels)
+            return self._smoothed(np.clip(found, *range_px), valid[camera], range_px)
+
+        maps = dict(zip(cameras, run_all(completed, cameras), strict=True))
         greys = {camera: views.grey_of(camera) for camera in cameras}
         return _subpixel(array, greys, maps, valid, range_px, self.settings.subpixel_steps), valid
 
