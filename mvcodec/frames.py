@@ -89,6 +89,8 @@ class DecodedSet:
         disparity_range_px: (lo, hi) that the maps can hold.
         absent: real cameras that sent nothing usable; their pictures and maps are made from the others'.
         enhanced: virtual views out of the stream's enhancement layer; those that were asked for.
+        coding_error: mean squared error of luma that coding left in each real camera's picture, grey levels
+            squared, independent of the other cameras'; None: not known.
     """
 
     array: CameraArray
@@ -99,6 +101,7 @@ class DecodedSet:
     disparity_range_px: tuple[float, float]
     absent: tuple[Position, ...] = ()
     enhanced: Mapping[Position, FinishedView] = field(default_factory=dict)
+    coding_error: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -176,6 +176,18 @@ class StreamHeader:
         return self.disparity_cameras == "none" or self.disparity_use == "prediction"
 
     @property
+    def coding_error(self) -> tuple[float, float] | None:
+        """What coding leaves in the real cameras' pictures, as the settings say it; None: they don't.
+
+        Mean squared error of luma, grey levels squared, in keyframes and in other frame sets.
+        """
+        match self.settings.get("coding_error"):
+            case [int() | float() as keyframes, int() | float() as others]:
+                known = all(0 <= each < math.inf for each in (keyframes, others))
+                return (float(keyframes), float(others)) if known else None
+        return None
+
+    @property
     def tracks(self) -> tuple[Track, ...]:
         """The video tracks: pictures of every real camera, then the maps."""
         pictures = (self.picture_track(camera) for camera in self.array.real)

@@ -231,7 +231,13 @@ def test_which_matcher_decodes() -> None:
     with Decoder.open(file) as decoder:
         (by_default,) = decoder
         maps = by_default.disparities
-    expected = Smoothed(make_matcher("sgbm")).match(by_default.array, by_default.pictures, RANGE_PX)
+    expected = estimate_maps(
+        by_default.array,
+        by_default.pictures,
+        RANGE_PX,
+        Smoothed(make_matcher("sgbm")),
+        by_default.coding_error,
+    )
     np.testing.assert_array_equal(maps[0, 0].values_px, expected[0, 0].values_px)
     with pytest.raises(SettingError, match="matcher: found guess, expected one of"):
         Decoder.open(file, matcher="guess")

@@ -26,6 +26,8 @@ class SetMaker:
 
     def __init__(self, header: StreamHeader, matcher: Matcher | None) -> None:
         self._header, self._matcher = header, matcher
+        keyframes, others = header.coding_error or (None, None)
+        self._coding_error = {True: keyframes, False: others}
         self._pictures = {camera: header.picture_track(camera) for camera in header.array.real}
         self._maps = {camera: Track(TrackKind.DISPARITY, camera) for camera in header.map_cameras}
 
@@ -36,7 +38,7 @@ class SetMaker:
             None where no map can be had of any camera that is there.
         """
         header, first, planes, reasons = self._header, tracks.first, tracks.planes, tracks.reasons
-        array, span = header.array, header.disparity_range_px
+        array, span, error = header.array, header.disparity_range_px, self._coding_error[first.keyframe]
         coded = {camera: planes[track] for camera, track in self._pictures.items() if camera not in reasons}
         maps = {camera: planes[track] for camera, track in self._maps.items() if camera not in reasons}
         matcher = self._matcher
@@ -51,8 +53,11 @@ class SetMaker:
         if matcher is None:
             disparities = sent_maps(header, maps, pictures, [*coded])
         else:
-            disparities = MapsOnDemand([*coded], partial(estimate_maps, array, pictures, span, matcher))
+            find = partial(estimate_maps, array, pictures, span, matcher, error)
+            disparities = MapsOnDemand([*coded], find)
         if reasons:
             pictures, disparities = fill_absent(array, pictures, disparities)
         absent = tuple(camera for camera in self._pictures if camera in reasons)
-        return DecodedSet(array, first.index, first.time_ns, pictures, disparities, span, absent)
+        return DecodedSet(
+            array, first.index, first.time_ns, pictures, disparities, span, absent, coding_error=error
+        )

@@ -12,13 +12,16 @@ import numpy as np
 from mvcodec.array import CameraArray, Position
 from mvcodec.decoding.derived_maps import derive_map
 from mvcodec.errors import SettingError
-from mvcodec.frames import DisparityMap, Picture
+from mvcodec.frames import DecodedSet, DisparityMap, Picture
 from mvcodec.layers.refinement import make_matcher
 from mvcodec.stereo.matcher import Matcher
 from mvcodec.stream import StreamHeader
+from mvcodec.synthesis.cross_view import STRENGTH, filter_picture
+from mvcodec.synthesis.fetch_sources import Sources
 from mvcodec.workers import run_all
 
 DEFAULT_MATCHER = "joint"
+QUICK_MATCHER = "realtime"
 
 SMOOTH_WINDOW, SMOOTH_PX, SMOOTH_REACH_PX = 7, 1.0, 2.0
 """Of `Smoothed`: the window, px, and how much nearness of disparities and of pixels count; measured in
@@ -109,6 +112,7 @@ def estimate_maps(
     pictures: Mapping[Position, Picture],
     range_px: tuple[float, float],
     matcher: Matcher,
+    coding_error: float | None = None,
 ) -> dict[Position, DisparityMap]:
     """The maps of real cameras from their decoded pictures.
 
@@ -118,8 +122,12 @@ def estimate_maps(
     Args:
         pictures: uint8 (H, W, 3) RGB of real cameras; `can_be_estimated` holds for them.
         range_px: (lo, hi), px between neighbouring real cameras; the maps keep within it.
+        coding_error: as `DecodedSet.coding_error`; where it is known, and all cameras are there, pictures are
+            filtered before they are matched, by maps that are found quickly.
     """
     if len(pictures) == len(array.real):
+        if coding_error is not None and len(pictures) > 1:
+            pictures = _filtered(array, pictures, range_px, coding_error)
         return matcher.match(array, pictures, range_px)
     found: dict[Position, DisparityMap] = {}
     for camera in pictures:
@@ -128,6 +136,19 @@ def estimate_maps(
             found |= _match_block(array, block, pictures, range_px, matcher)
     alone = [camera for camera in pictures if camera not in found]
     return found | {camera: derive_map(array, found, range_px, camera) for camera in alone}
+
+
+def _filtered(
+    array: CameraArray,
+    pictures: Mapping[Position, Picture],
+    range_px: tuple[float, float],
+    coding_error: float,
+) -> dict[Position, Picture]:
+    """The pictures with less coding noise, see `mvcodec.synthesis.cross_view`."""
+    maps = make_matcher(QUICK_MATCHER).match(array, pictures, range_px)
+    decoded = DecodedSet(array, 0, 0, pictures, maps, range_px, coding_error=coding_error)
+    sources = Sources(decoded, None)
+    return {camera: filter_picture(decoded, camera, sources, STRENGTH) for camera in array.real}
 
 
 def _block(array: CameraArray, there: Collection[Position], camera: Position) -> tuple[Position, ...]:

@@ -13,6 +13,7 @@ import mvcodec
 from mvcodec.array import CameraArray, Position
 from mvcodec.depth import depth_mm, warn_behind_infinity
 from mvcodec.encoding.coders import Coders
+from mvcodec.encoding.coding_error import coding_error
 from mvcodec.encoding.config import AUTO, EncoderConfig, default_gop, find_matcher, matcher_name
 from mvcodec.encoding.enhancer import enhanced_views
 from mvcodec.encoding.predicted_cameras import prediction_order
@@ -234,6 +235,7 @@ class Encoder:
             "prediction": config.prediction if self._order else None,
             "gop": self._gop,
             "keyframe_ratio": config.keyframe_ratio,
+            "coding_error": coding_error(config),
             "speed": config.speed,
             "preset": config.chosen_preset,
             "matcher": matcher_name(config.chosen_matcher),

@@ -9,20 +9,19 @@ meet there, and what no camera saw is filled from the background side.
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mvcodec.array import Position, Viewpoint
+from mvcodec.array import Viewpoint
 from mvcodec.frames import DecodedSet, FloatMap, Picture, RenderedView
 from mvcodec.settings import check_settings, setting
-from mvcodec.synthesis.camera_spread import measure_spread
 from mvcodec.synthesis.cell_cameras import CellCameras, find_cameras, real_view
+from mvcodec.synthesis.cross_view import STRENGTH, can_be_filtered, filter_picture
+from mvcodec.synthesis.fetch_sources import Sources
 from mvcodec.synthesis.view_disparity import Ballot, view_disparity
-from mvcodec.workers import check_threads, run_all, run_in_bands, threads
+from mvcodec.workers import check_threads, run_in_bands, threads
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,43 +66,16 @@ class LayeredSettings:
     edge_trust: float = setting(0.5, "weight of pixels fetched at a camera's contours", low=1e-3, high=1)
     sharpness: float = setting(-0.7, "Keys' parameter a of the cubic fetch", low=-1, high=0)
     hole_reach_px: int = setting(64, "how far holes are painted from, px", low=1, high=4096)
+    filter: float = setting(
+        STRENGTH,
+        "how much of a real camera's coding noise counts where other cameras are asked what it is: 0: its"
+        " picture stays as it was decoded",
+        low=0,
+        high=2,
+    )
 
     def __post_init__(self) -> None:
         check_settings(self, "LayeredSettings.")
-
-
-class _Sources:
-    """The real cameras of one decoded set, prepared for fetching when a view first needs them.
-
-    `planes` are those of `kernels.view_planes`, indexed by place in `array.real`.
-    """
-
-    def __init__(self, decoded: DecodedSet, spread: float | None) -> None:
-        from mvcodec.kernels.view_planes import make_room
-
-        array = decoded.array
-        self.decoded = decoded
-        self.spread = measure_spread(decoded) if spread is None else spread
-        self.planes = make_room(len(array.real), array.height, array.width)
-        self._ready: set[Position] = set()
-        self._lock = threading.Lock()
-
-    def prepare(self, cameras: Sequence[Position], tolerance_px: float) -> None:
-        """Make these cameras ready, side by side."""
-        with self._lock:
-            missing = [camera for camera in cameras if camera not in self._ready]
-            run_all(partial(self._prepare, tolerance_px=tolerance_px), missing)
-            self._ready.update(missing)
-
-    def _prepare(self, camera: Position, tolerance_px: float) -> None:
-        from mvcodec.kernels.view_planes import mark_contours, split_luma
-
-        place = self.decoded.array.real.index(camera)
-        lumas, colours, disparities, fetchable = self.planes
-        split_luma(self.decoded.pictures[camera], lumas[place], colours[place])
-        values = self.decoded.disparities[camera].values_px
-        disparities[place] = values
-        mark_contours(values, tolerance_px, fetchable[place])
 
 
 class Layered:
@@ -127,13 +99,13 @@ class Layered:
         check_threads(thread_count)
         self._threads = thread_count
         self._lock = threading.Lock()
-        self._sources: _Sources | None = None
+        self._sources: Sources | None = None
 
     def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
         """See `Synthesizer.render`. `seen_by` counts the cameras that agree on the pixel's surface."""
         own = real_view(decoded, viewpoint)
         if own is not None:
-            return own
+            return self._filtered(decoded, own)
         with threads(self._threads):
             sources, cameras = self._prepared(decoded, viewpoint)
             disparity = view_disparity(
@@ -151,18 +123,31 @@ class Layered:
         with threads(self._threads):
             self._prepared(decoded, viewpoint)
 
-    def _prepared(self, decoded: DecodedSet, viewpoint: Viewpoint) -> tuple[_Sources, CellCameras]:
-        """The cameras that see a view, and the sources with these prepared."""
+    def _filtered(self, decoded: DecodedSet, own: RenderedView) -> RenderedView:
+        """A real camera's view with what the other cameras say of its coding noise."""
+        camera = own.viewpoint.position
+        enhanced = camera in decoded.enhanced
+        if camera is None or enhanced or not self.settings.filter or not can_be_filtered(decoded, camera):
+            return own
+        with threads(self._threads):
+            pixels = filter_picture(decoded, camera, self._sources_of(decoded), self.settings.filter)
+        return replace(own, pixels=pixels)
+
+    def _sources_of(self, decoded: DecodedSet) -> Sources:
         with self._lock:
             if self._sources is None or self._sources.decoded is not decoded:
-                self._sources = _Sources(decoded, self.settings.spread)
-            sources = self._sources
+                self._sources = Sources(decoded, self.settings.spread)
+            return self._sources
+
+    def _prepared(self, decoded: DecodedSet, viewpoint: Viewpoint) -> tuple[Sources, CellCameras]:
+        """The cameras that see a view, and the sources with these prepared."""
+        sources = self._sources_of(decoded)
         cameras = find_cameras(decoded, viewpoint, sources.spread)
         sources.prepare(cameras.cameras, self.settings.tolerance_px)
         return sources, cameras
 
     def _colour(
-        self, sources: _Sources, cameras: CellCameras, disparity: FloatMap
+        self, sources: Sources, cameras: CellCameras, disparity: FloatMap
     ) -> tuple[Picture, NDArray[np.uint8]]:
         from mvcodec.kernels import view_vectors
         from mvcodec.kernels.table import kernel
