@@ -11,7 +11,7 @@ from plane_scene import Plane, PlaneScene, grid
 
 from mvcodec.array import Position, Viewpoint
 from mvcodec.frames import DecodedSet, Picture
-from mvcodec.kernels.cross_view import mix
+from mvcodec.kernels.camera_mixing import mix
 from mvcodec.synthesis.cross_view import can_be_filtered
 from mvcodec.synthesis.layered import Layered, LayeredSettings
 from mvcodec.workers import threads

@@ -66,8 +66,11 @@ def test_matching_and_rendering_take_every_kernel_from_the_table(
 
     def results() -> list[Any]:
         maps = [matcher.match(array, pictures, RANGE_PX) for matcher in matchers]
-        decoded = DecodedSet(array, 0, 0, pictures, maps[0], RANGE_PX)
-        views = [make_synthesizer(name).render(decoded, Viewpoint(0.4, 0.3)) for name in ("layered", "quick")]
+        decoded = DecodedSet(array, 0, 0, pictures, maps[0], RANGE_PX, coding_error=9.0)
+        places = Viewpoint(0.4, 0.3), Viewpoint(0, 0)
+        views = [
+            make_synthesizer(name).render(decoded, place) for name in ("layered", "quick") for place in places
+        ]
         return [m.values_px for of_one in maps for m in of_one.values()] + [view.pixels for view in views]
 
     with threads(2):

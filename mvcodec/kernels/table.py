@@ -54,7 +54,7 @@ RENDERING = (
     "view_depth.fill_background",
     "view_colour.blend",
     "view_quick.blend",
-    "cross_view.mix",
+    "camera_mixing.mix",
     "view_holes.paint_holes",
 )
 

@@ -73,7 +73,7 @@ def filter_picture(decoded: DecodedSet, camera: Position, sources: Sources, stre
     pixels: Picture = np.empty_like(own)
     error = strength * decoded.coding_error
     run_in_bands(
-        array.height, kernel("cross_view.mix"), own, others, seen_by, squares, counts, error, MOST, pixels
+        array.height, kernel("camera_mixing.mix"), own, others, seen_by, squares, counts, error, MOST, pixels
     )
     return pixels
 

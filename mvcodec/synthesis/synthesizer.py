@@ -14,7 +14,8 @@ class Synthesizer(Protocol):
     def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
         """The view from `viewpoint` (in steps of the dense grid, within the real cameras' span).
 
-        On a real camera's place it is that camera's decoded picture, exactly.
+        On a real camera's place it is that camera's decoded picture: exactly, where `decoded.coding_error` is
+        None; else perhaps with less coding noise.
 
         Raises:
             SettingError: the viewpoint lies outside the span of the real cameras.
