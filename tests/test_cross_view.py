@@ -108,7 +108,7 @@ def mix_twin(
     np.divide(np.float32(part), mean, out=weights, where=mean > 0)
     weights = np.where(seen_by > 0, np.minimum(weights, np.float32(most)), np.float32(0))
     moved = own + weights[..., None] * (others.astype(np.float32) - own)
-    return np.floor(moved + np.float32(0.5)).astype(np.uint8)
+    return np.asarray(np.floor(moved + np.float32(0.5)), np.uint8)
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (5, 3), (17, 31)])
