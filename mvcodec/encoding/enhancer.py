@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 
 from mvcodec.array import CameraArray, Position
@@ -24,6 +25,10 @@ from mvcodec.workers import run_all
 
 REFERENCES = 4
 """Decoded pictures that a view is predicted from: of 3, 4 and 6 the cheapest (`docs/measurements.md`)."""
+
+NO_FARTHER = 1.5
+"""A reference's squared distance beside the nearest one's, at most: what is farther away adds nothing that
+those nearer to the view don't have, and makes predictions worse (`docs/measurements.md`)."""
 
 FINER_FOR_OTHERS = 6.0
 """Steps of the quantizer between a view that all others build on and one that none does: it saves 2 to 3 %
@@ -68,9 +73,13 @@ def layer_order(
         view = max(left, key=lambda view: min(away(view, other) for other in decoded))
         references: list[Position] = []
         needed: frozenset[Position] = frozenset()
+        nearest = math.inf
         for other in sorted(decoded, key=lambda other: (away(view, other), other)):
             with_other = needed | needs[other] | ({other} - set(array.real))
-            if len(references) < REFERENCES and (most is None or len(with_other) <= most):
+            if most is not None and len(with_other) > most:
+                continue
+            nearest = min(nearest, away(view, other))
+            if len(references) < REFERENCES and away(view, other) <= NO_FARTHER * nearest:
                 references.append(other)
                 needed = with_other
         needs[view] = needed
