@@ -69,17 +69,19 @@ def view_disparity(
         ballot.denial,
         voted,
     )
-    cleaned, smooth = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
+    cleaned = np.empty((height, width), np.float32)
+    smooth = np.empty((height, width), np.float32) if ballot.speck_area_px > 1 else cleaned
 
     def clean(first: int, last: int) -> None:
         above, below = max(first - 1, 0), min(last + 1, height)  # the median asks one row beyond the band
         cleaned[first:last] = cv2.medianBlur(voted[above:below], 3)[first - above : last - above]
         kernel("view_depth.restore_thin")(voted, ballot.tolerance_px, cleaned, first, last)
         kernel("view_depth.fill_background")(cleaned, background_px, first, last)
-        smooth[first:last] = cleaned[first:last]
+        if smooth is not cleaned:
+            smooth[first:last] = cleaned[first:last]
 
     run_in_bands(height, clean)
-    if ballot.speck_area_px == 1:
+    if smooth is cleaned:
         return cleaned
     pieces = cleaned, ballot.tolerance_px, 1, ballot.speck_area_px, smooth
     run_in_bands(height, kernel("specks.smooth_over"), *pieces)
