@@ -283,23 +283,24 @@ def test_settings_at_their_limits_still_make_maps() -> None:
         assert np.mean(np.abs(maps[camera].values_px - scene.disparity_px(camera)) > 1) < 0.1
 
 
-def pole_and_speck(*, confirmed: bool) -> tuple[FloatMap, FloatMap]:
+def pole_and_speck(nearer_px: float, *, confirmed: bool) -> tuple[FloatMap, FloatMap]:
     """A map with a pole 2 px wide and a speck, before and after smoothing."""
     disparity = np.full((40, 60), 3, np.float32)
-    disparity[5:35, 20:22] = 12
-    disparity[8:10, 40:42] = 12
+    disparity[5:35, 20:22] += nearer_px
+    disparity[8:10, 40:42] += nearer_px
     smooth = Joint()._smoothed(disparity, np.full(disparity.shape, confirmed), (0.0, 20.0))
     return disparity, smooth
 
 
-def test_a_confirmed_pole_outlives_the_median_and_a_speck_does_not() -> None:
-    disparity, smooth = pole_and_speck(confirmed=True)
-    assert (smooth[:, :30] == disparity[:, :30]).all()
+@pytest.mark.parametrize("nearer_px", [9, 2])
+def test_a_confirmed_pole_outlives_the_median_and_a_speck_does_not(nearer_px: float) -> None:
+    disparity, smooth = pole_and_speck(nearer_px, confirmed=True)
+    assert (smooth[6:34, :30] == disparity[6:34, :30]).all()
     assert (smooth[:, 30:] == 3).all()
 
 
 def test_a_pole_that_nobody_confirms_goes() -> None:
-    _, smooth = pole_and_speck(confirmed=False)
+    _, smooth = pole_and_speck(9, confirmed=False)
     assert (smooth == 3).all()
 
 

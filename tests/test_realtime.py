@@ -8,6 +8,7 @@ from stereo_scene import Planes, linear_or_grid
 
 from mvcodec.array import Position
 from mvcodec.frames import DisparityMap, Picture
+from mvcodec.stereo.joint import Joint
 from mvcodec.stereo.joint_settings import BALANCED, JointSettings
 from mvcodec.stereo.matcher import HalvingMatcher, SelectiveMatcher
 from mvcodec.stereo.realtime import Realtime
@@ -101,6 +102,27 @@ def test_maps_of_small_copies_are_refined_by_the_pictures_themselves() -> None:
         return float(np.median(off[found.valid]))
 
     assert median_error(2) < median_error(0) / 2
+
+
+@pytest.mark.parametrize(("plain_levels", "edge"), [(7, 31), (0, 30)])
+def test_surfaces_reach_over_soft_edges_of_the_whole_picture(plain_levels: int, edge: int) -> None:
+    """The nearer one on the left is bright, and moves by 8 px; maps end at the foot of its edge."""
+    array = linear_or_grid(1, 2, 60, 20)
+    x = np.arange(60)[None, :, None] * np.ones((20, 1, 3))
+    pictures = {
+        (0, col): np.clip(200 - 160 * (x - at + 0.5), 40, 200).astype(np.uint8)
+        for col, at in ((0, 30.4), (1, 22.4))
+    }
+    maps = {}
+    for camera, last in (((0, 0), 30), ((0, 1), 22)):
+        values = np.full((20, 60), 2, np.float32)
+        values[:, : last + 1] = 8
+        maps[camera] = DisparityMap(values, np.zeros(values.shape, np.bool_))
+    matcher = Joint(JointSettings(**{**BALANCED, "plain_levels": plain_levels}))
+    matcher.match(array, pictures, (0.0, 10.0))
+    found = matcher.refined(array, pictures, maps, (0.0, 10.0))[0, 0].values_px
+    assert (found[:, : edge + 1] == 8).all()
+    assert (found[:, edge + 1 :] == 2).all()
 
 
 def test_what_no_partner_sees_is_not_valid() -> None:

@@ -16,7 +16,7 @@ from mvcodec.frames import DisparityMap, FloatMap, Mask
 
 SPECKLE_STEP_PX = 1.0
 SPECK_STEP_PX, SPECK_REACH_PX = 1.5, 2
-MEDIAN_SIZE = 5
+MEDIAN_SIZE, SMALL_MEDIAN_SIZE = 5, 3
 FAR_TAIL, NEAR_TAIL = 5e-4, 1e-4
 """Of valid pixels, so many at either end are taken as wrong. What is near is a small thing more often."""
 _SIXTEENTHS = 16
@@ -170,6 +170,35 @@ def median(values_px: FloatMap, size: int, range_px: tuple[float, float]) -> Flo
     codes = np.rint((values_px - low) / step).clip(0, 255).astype(np.uint8)
     smooth = cv2.medianBlur(codes, size).astype(np.float32) * np.float32(step) + np.float32(low)
     return np.asarray(smooth.clip(low, high))
+
+
+def median_but_thin(
+    values_px: FloatMap,
+    firm: Mask,
+    size: int,
+    limits_px: tuple[float, float],
+    range_px: tuple[float, float],
+) -> FloatMap:
+    """The median, but poles and wires that it would take away stay where they are firm.
+
+    Of what is that thin, a smaller median leaves what is wider than one pixel. At the contours of what is
+    left the median has its way: there it is noise that stands out.
+
+    Args:
+        values_px: float32 (H, W), px.
+        firm: bool (H, W), where they may stay.
+        size: of the median's window, see `median`.
+        limits_px: how much nearer than the larger median the smaller one must leave a pixel, and a pixel must
+            be than all that is left around it.
+        range_px: see `median`.
+    """
+    nearer_px, thin_px = limits_px
+    smooth = median(values_px, size, range_px)
+    if size > SMALL_MEDIAN_SIZE:
+        finer = median(values_px, SMALL_MEDIAN_SIZE, range_px)
+        smooth = np.where(firm & (finer - smooth > nearer_px), finer, smooth)
+    around = np.asarray(cv2.dilate(smooth, np.ones((3, 3), np.uint8)), np.float32)
+    return np.where(firm & (values_px - around > thin_px), values_px, smooth)
 
 
 def _finish(values: FloatMap, valid: Mask, range_px: tuple[float, float], median_size: int) -> DisparityMap:

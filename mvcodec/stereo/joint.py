@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +23,7 @@ from mvcodec.stereo.consistency import (
     drop_speckles,
     fill_from_farther,
     median,
+    median_but_thin,
     without_specks,
 )
 from mvcodec.stereo.exposure import camera_gains
@@ -84,11 +84,19 @@ class Joint:
                 cameras,
             )
             maps = dict(zip(cameras, extended, strict=True))
+        if not self.settings.full_size_steps:
+            maps = self._widened(array, maps, views.grey)
+        return self._finished(maps, valid)
+
+    def _widened(
+        self, array: CameraArray, maps: Mapping[Position, FloatMap], greys: NDArray[np.uint8]
+    ) -> dict[Position, FloatMap]:
+        """Surfaces reach further over plain ground where all real cameras' greys, uint8 (N, H, W), say so."""
         levels = self.settings.plain_levels
         widened = run_all(
-            lambda camera: widen(maps[camera], views, CameraPartners.of(array, camera), levels), cameras
+            lambda camera: widen(maps[camera], greys, CameraPartners.of(array, camera), levels), maps
         )
-        return self._finished(dict(zip(cameras, widened, strict=True)), valid)
+        return dict(zip(maps, widened, strict=True))
 
     def _finished(
         self, maps: Mapping[Position, FloatMap], valid: Mapping[Position, Mask]
@@ -149,11 +157,12 @@ class Joint:
         """Maps that small copies of these pictures gave last, sub-pixel by the pictures themselves."""
         if not self.settings.full_size_steps or self._gains.keys() != set(array.real):
             return dict(maps)
-        greys = {camera: equal_grey(pictures[camera], self._gains[camera]) for camera in maps}
+        greys = {camera: equal_grey(pictures[camera], self._gains[camera]) for camera in array.real}
         values = {camera: found.values_px for camera, found in maps.items()}
         valid = {camera: found.valid for camera, found in maps.items()}
         moved = _subpixel(array, greys, values, valid, range_px, self.settings.full_size_steps)
-        return self._finished(moved, valid)
+        stacked = np.stack([greys[camera] for camera in array.real])
+        return self._finished(self._widened(array, moved, stacked), valid)
 
     def _matched(
         self,
@@ -290,16 +299,10 @@ class Joint:
         return median(np.clip(filled, *range_px), self.settings.median_size, range_px)
 
     def _smoothed(self, disparity: FloatMap, valid: Mask, range_px: tuple[float, float]) -> FloatMap:
-        """The median, but poles and wires that it would take away stay where another camera confirms them.
-
-        At the contours of what is left the median has its way: there it is noise that stands out.
-        """
         settings = self.settings
-        smooth = median(disparity, settings.median_size, range_px)
-        around = np.asarray(cv2.dilate(smooth, np.ones((3, 3), np.uint8)), np.float32)
-        thin = valid & (disparity - around > settings.thin_px)
-        thin &= drop_speckles(disparity, valid, settings.thin_area_px)
-        return np.where(thin, disparity, smooth)
+        firm = valid & drop_speckles(disparity, valid, settings.thin_area_px)
+        limits = settings.tolerance_px, settings.thin_px
+        return median_but_thin(disparity, firm, settings.median_size, limits, range_px)
 
     def _beyond_partners(
         self, array: CameraArray, camera: Position, picture: Picture, valid: Mask, disparity: FloatMap

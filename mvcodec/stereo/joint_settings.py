@@ -88,7 +88,10 @@ class JointSettings:
     )
     subpixel_steps: int = setting(3, "steps of sub-pixel refinement", low=0, high=20)
     full_size_steps: int = setting(
-        0, "steps of it after maps of small copies were brought back", low=0, high=20
+        0,
+        "steps of it after maps of small copies were brought back; surfaces reach further after these then",
+        low=0,
+        high=20,
     )
 
     def __post_init__(self) -> None:
@@ -120,7 +123,7 @@ class JointSettings:
         return Penalties(*steps, self.contrast, self.diagonals)
 
 
-BALANCED: dict[str, Any] = {"plain_levels": 0, "subpixel_steps": 0, "full_size_steps": 2}
+BALANCED: dict[str, Any] = {"median_size": 3, "subpixel_steps": 0, "full_size_steps": 2}
 """Of what is matched in small copies (`mvcodec.stereo.realtime`)."""
 
 REALTIME: dict[str, Any] = {
@@ -134,5 +137,11 @@ REALTIME: dict[str, Any] = {
 }
 """Of the same in real time."""
 
-SMALL_PICTURES: dict[str, Any] = {"completion": True, "beyond_partners": True, "plain_levels": 7}
+SMALL_PICTURES: dict[str, Any] = {
+    "completion": True,
+    "beyond_partners": True,
+    "plain_levels": 7,
+    "median_size": 5,
+    "full_size_steps": 0,
+}
 """What pictures that are too small to be shrunk have time for in real time."""

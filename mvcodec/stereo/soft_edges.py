@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap
-from mvcodec.stereo.matching_view import CameraPartners, MatchingViews
+from mvcodec.stereo.matching_view import CameraPartners
 
 SURFACE_STEP_PX = 1.5
 PLAIN_PX = 3
@@ -18,12 +19,14 @@ PLAIN_PX = 3
 MISFIT_SHARE = 0.5
 
 
-def widen(disparity: FloatMap, views: MatchingViews, those: CameraPartners, plain_levels: int) -> FloatMap:
+def widen(
+    disparity: FloatMap, greys: NDArray[np.uint8], those: CameraPartners, plain_levels: int
+) -> FloatMap:
     """A map whose surfaces reach a pixel further over plain ground, where partners see their edge move so.
 
     Args:
         disparity: float32 (H, W), px.
-        views: of the array.
+        greys: uint8 (N, H, W), of all cameras.
         those: the map's camera and its partners.
         plain_levels: grey levels below which pixels look alike; 0: nothing changes.
     """
@@ -35,7 +38,7 @@ def widen(disparity: FloatMap, views: MatchingViews, those: CameraPartners, plai
     kernel("contours.widen")(
         np.ascontiguousarray(disparity, np.float32),
         np.asarray(cv2.dilate(disparity, np.ones((3, 3), np.uint8)), np.float32),
-        views.grey,
+        greys,
         those.camera,
         those.partners,
         those.steps,
