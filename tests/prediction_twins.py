@@ -9,6 +9,22 @@ Ints = NDArray[np.int32]
 UNKNOWN = -(1 << 24)
 
 
+def _cubic() -> NDArray[np.int64]:
+    """(16, 4): Keys' cubic in 128ths at sixteenths of a pixel; the second tap takes what rounding leaves."""
+    rows = []
+    for t in np.arange(16) / 16:
+        near, *far = (1 - t, 1 + t, 2 - t)
+        first, fourth = (-0.7 * s**3 + 3.5 * s**2 - 5.6 * s + 2.8 for s in far)
+        third = 1.3 * near**3 - 2.3 * near**2 + 1
+        taps = [int(np.floor(128 * tap + 0.5)) for tap in (first, third, fourth)]
+        rows.append([taps[0], 128 - sum(taps), taps[1], taps[2]])
+    return np.array(rows, np.int64)
+
+
+CUBIC = _cubic()
+LINEAR = np.array([[128 - 8 * phase, 8 * phase] for phase in range(16)], np.int64)
+
+
 def enlarge(small: Ints, luma: NDArray[np.uint8], shape: tuple[int, int]) -> Ints:
     rows, columns = small.shape
     out = np.empty(shape, np.int32)

@@ -65,36 +65,41 @@ def test_voting_and_filling_are_their_twins(seed: int, size: tuple[int, int], co
 
 
 @settings(max_examples=25, deadline=None)
-@given(SEEDS, st.tuples(st.integers(1, 5), st.integers(1, 6)), st.integers(1, 3))
-def test_fetching_is_its_twin(seed: int, half: tuple[int, int], count: int) -> None:
+@given(SEEDS, st.tuples(st.integers(1, 3), st.integers(1, 25)), st.integers(1, 3), st.sampled_from([1, 40]))
+def test_fetching_is_its_twin(seed: int, half: tuple[int, int], count: int, coarse: int) -> None:
     rng = np.random.default_rng(seed)
     height, width = 2 * half[0], 2 * half[1]
-    maps = rng.choice([-90, 0, 64, 130], (count, height, width)).astype(np.int32)
-    disparity = rng.choice([-90, 0, 64, 500], (height, width)).astype(np.int32)
-    shifts, weights = rng.integers(-70000, 70000, (count, 2)), rng.integers(1, 5000, count)
-    luma = rng.integers(0, 256, (count, height + 4, width + 4), dtype=np.uint8)
-    chroma = rng.integers(0, 256, (count, 2, half[0] + 4, half[1] + 4), dtype=np.uint8)
+    # Of wide surfaces, or of pixels that have nothing to do with each other.
+    values = rng.choice([-90, 0, 64, 130, 500], (count + 1, height, -(-width // coarse)))
+    *maps, disparity = values.repeat(coarse, axis=2)[:, :, :width].astype(np.int32)
+    shifts = rng.integers(-70000, 70000, (count, 2)).astype(np.int32) * rng.integers(
+        0, 2, (count, 2), np.int32
+    )
+    weights = rng.integers(1, 5000, count)
+    luma = rng.integers(0, 256, (count, height, width), dtype=np.uint8)
+    chroma = rng.integers(0, 256, (2, count, *half), dtype=np.uint8)
+    planes = [Planes(luma[i], chroma[0, i], chroma[1, i]) for i in range(count)]
+    ready = [PredictionSource((0, i), planes[i], maps[i]).ready for i in range(count)]
     y, uv = np.empty((height, width), np.uint8), np.empty((2, *half), np.uint8)
-    common = maps, shifts, weights
-    places, pairs = shifts.astype(np.int32), chroma.astype(np.int16).transpose(0, 2, 3, 1).copy()
-    in_kernels = maps, places, weights, prediction.TAPS, disparity
-    prediction_colour.predict_luma(luma.astype(np.int16), *in_kernels, y, 0, height)
-    prediction_colour.predict_chroma(pairs, *in_kernels, uv, 0, half[0])
-    np.testing.assert_array_equal(y, twins.predict(luma, *common, prediction.CUBIC, disparity, 1))
+    cameras = prediction.addresses(ready)
+    prediction_colour.predict(cameras, shifts, weights, np.ascontiguousarray(disparity), y, uv, 0, half[0])
+    common = np.array(maps), shifts.astype(np.int64), weights
+    bordered = [np.pad(each, ((0, 0), (2, 2), (2, 2)), mode="edge") for each in (luma, *chroma)]
+    np.testing.assert_array_equal(y, twins.predict(bordered[0], *common, twins.CUBIC, disparity, 1))
     for plane in (0, 1):
-        expected = twins.predict(chroma[:, plane], *common, prediction.LINEAR, disparity, 2)
+        expected = twins.predict(bordered[1 + plane], *common, twins.LINEAR, disparity, 2)
         np.testing.assert_array_equal(uv[plane], expected)
 
 
 def test_the_taps_are_the_formats() -> None:
-    assert prediction.CUBIC.sum(axis=1).tolist() == [128] * 16
-    assert prediction.CUBIC[[0, 4, 8, 12]].tolist() == [
+    assert twins.CUBIC.sum(axis=1).tolist() == [128] * 16
+    assert twins.CUBIC[[0, 4, 8, 12]].tolist() == [
         [0, 128, 0, 0],
         [-13, 112, 33, -4],
         [-11, 75, 75, -11],
         [-4, 33, 112, -13],
     ]
-    assert prediction.LINEAR[5].tolist() == [88, 40]
+    assert twins.LINEAR[5].tolist() == [88, 40]
 
 
 def scene_sources(array: CameraArray) -> tuple[PlaneScene, list[PredictionSource]]:

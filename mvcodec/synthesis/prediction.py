@@ -21,10 +21,6 @@ from mvcodec.workers import run_all, run_in_bands
 SPREAD = 205
 """1024ths of a squared cell; a camera at distance b counts 1 / (SPREAD + 1024 b^2)."""
 
-SHARPNESS = -0.7
-"""Keys' parameter a of the cubic fetch."""
-
-BORDER = 2
 IntMap = NDArray[np.int32]
 
 
@@ -50,15 +46,19 @@ class PredictionSource:
     disparity: IntMap
 
     @cached_property
-    def luma(self) -> NDArray[np.int16]:
-        """int16 (H + 4, W + 4): luma, continued by BORDER."""
-        return np.pad(self.planes.y.astype(np.int16), BORDER, mode="edge")
+    def ready(self) -> tuple[IntMap, IntMap, IntMap]:
+        """Luma, chroma and disparity as `mvcodec.kernels.prediction_planes` prepares them."""
+        from mvcodec.kernels.prediction_planes import BORDER, pair_chroma, pair_luma, widen_map
+        from mvcodec.kernels.view_planes import reserve
 
-    @cached_property
-    def chroma(self) -> NDArray[np.int16]:
-        """int16 (H / 2 + 4, W / 2 + 4, 2): Cb and Cr, continued by BORDER."""
-        both = np.stack([self.planes.u, self.planes.v], axis=2).astype(np.int16)
-        return np.pad(both, ((BORDER, BORDER), (BORDER, BORDER), (0, 0)), mode="edge")
+        luma, chroma, own = (
+            reserve((height + 2 * BORDER, width + 2 * BORDER), np.dtype(np.int32))
+            for height, width in (self.planes.y.shape, self.planes.u.shape, self.disparity.shape)
+        )
+        pair_luma(self.planes.y, luma)
+        pair_chroma(self.planes.u, self.planes.v, chroma)
+        widen_map(self.disparity, own)
+        return luma, chroma, own
 
 
 def full_map(codes: Plane, luma: Plane, range_px: tuple[float, float], scale: int) -> IntMap:
@@ -114,21 +114,25 @@ def predict(
     Args:
         disparity: int32 (H, W) at the place, see `predicted_disparity`; or the place's own decoded map.
     """
-    from mvcodec.kernels.prediction_colour import predict_chroma, predict_luma
+    from mvcodec.kernels.prediction_colour import predict as predict_rows
 
     ordered = sorted(sources, key=lambda source: source.place)
-    maps = np.stack([source.disparity for source in ordered])
     places = [source.place for source in ordered]
     shifts = np.array([_shift(array, camera, place) for camera in places], np.int32)
     weights = _weights(array, places, place)
     height, width = disparity.shape
     y = np.empty((height, width), np.uint8)
     chroma = np.empty((2, height // 2, width // 2), np.uint8)
-    luma_planes = np.stack([source.luma for source in ordered])
-    run_in_bands(height, predict_luma, luma_planes, maps, shifts, weights, TAPS, disparity, y)
-    chroma_planes = np.stack([source.chroma for source in ordered])
-    run_in_bands(height // 2, predict_chroma, chroma_planes, maps, shifts, weights, TAPS, disparity, chroma)
+    ready = [source.ready for source in ordered]  # held until all is done: the kernel knows addresses alone
+    run_in_bands(height // 2, predict_rows, addresses(ready), shifts, weights, disparity, y, chroma)
     return Planes(y, chroma[0], chroma[1])
+
+
+def addresses(ready: Sequence[tuple[IntMap, ...]]) -> NDArray[np.int64]:
+    """Where planes with a border have their first pixels: int64 (N, 3) of N sources' `ready`."""
+    from mvcodec.kernels.prediction_planes import BORDER
+
+    return np.array([[plane[BORDER:, BORDER:].ctypes.data for plane in each] for each in ready], np.int64)
 
 
 def _shift(array: CameraArray, camera: Position, place: Position) -> tuple[int, int]:
@@ -144,30 +148,3 @@ def _weights(array: CameraArray, cameras: Sequence[Position], place: Position) -
         return (1 << 20) // (SPREAD + int(1024 * (across * across + down * down) + 0.5))
 
     return np.array([max(weight(camera), 1) for camera in cameras], np.int64)
-
-
-def _cubic_taps() -> NDArray[np.int64]:
-    """(16, 4): Keys' cubic in 128ths at sixteenths of a pixel; the second tap takes what rounding leaves."""
-    a = SHARPNESS
-    rows = []
-    for phase in range(16):
-        t = phase / 16
-        outer = [a * s**3 - 5 * a * s**2 + 8 * a * s - 4 * a for s in (1 + t, 2 - t)]
-        inner = (a + 2) * (1 - t) ** 3 - (a + 3) * (1 - t) ** 2 + 1
-        first, third, fourth = (int(np.floor(128 * tap + 0.5)) for tap in (outer[0], inner, outer[1]))
-        rows.append([first, 128 - first - third - fourth, third, fourth])
-    return np.array(rows, np.int64)
-
-
-CUBIC = _cubic_taps()
-LINEAR = np.array([[128 - 8 * phase, 8 * phase] for phase in range(16)], np.int64)
-
-
-def _products() -> NDArray[np.int16]:
-    """The taps down times those to the right for each place between pixels, as the kernels ask for them."""
-    luma = np.einsum("yj,xi->yxji", CUBIC, CUBIC).reshape(-1, 16)
-    chroma = np.einsum("yj,xi->yxij", LINEAR, LINEAR).reshape(-1, 2, 1, 2).repeat(2, axis=2).reshape(-1, 8)
-    return np.hstack([luma, chroma]).astype(np.int16).ravel()
-
-
-TAPS = _products()
