@@ -112,11 +112,13 @@ def test_hint_bounds_and_is_narrowed() -> None:
     array = linear_or_grid(1, 2, 320, 200)
     frames = [Planes(array, 10, 30).frame_set()]
     check(estimate_range(array, frames, (-50.0, 100.0)), 10, 30)
-    assert estimate_range(array, frames, (10.5, 29.5)) == (10.5, 29.5)
+    assert estimate_range(array, frames, (10.3, 29.7)) == (10.3, 29.7)
 
 
 @pytest.mark.parametrize(
-    ("hint", "low", "high"), [((8.0, 24.0), 8, 30), ((14.0, 34.0), 10, 34), ((13.0, 27.0), 10, 30)], ids=str
+    ("hint", "low", "high"),
+    [((8.0, 24.0), 8, 30), ((14.0, 34.0), 10, 34), ((13.0, 27.0), 10, 30), ((10.8, 29.2), 10, 30)],
+    ids=str,
 )
 def test_a_hint_that_is_too_narrow_is_widened_and_that_is_told(
     hint: tuple[float, float], low: int, high: int

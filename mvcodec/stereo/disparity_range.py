@@ -40,6 +40,8 @@ _NEAR_CLUSTER, _FAR_CLUSTER = 0.0007, 0.003
 _NEAR_TAIL, _FAR_TAIL = 0.0005, 0.001
 _NEAR_MARGIN, _FAR_MARGIN = 0.1, 0.02
 _LEAST_MARGIN_PX = 1.0
+_HINT_SLACK_PX = 0.5
+"""What pictures show beyond a hint by no more than this does not contradict it."""
 _HINT_ADVICE = "state disparity_per_step_px anew, or leave it out"
 _BESIDE_HINT, _LEAST_BESIDE_PX = 0.5, 4.0
 """Of a hint's extent, and px, how far beyond it is looked: further, chance would find more than there is."""
@@ -188,7 +190,7 @@ def _widened(
 ) -> tuple[float, float]:
     """The hint, or further where the pictures show more than that; which is told."""
     low, high = seen_px
-    beyond = low < hint_px[0] - _LEAST_MARGIN_PX, high > hint_px[1] + _LEAST_MARGIN_PX
+    beyond = low < hint_px[0] - _HINT_SLACK_PX, high > hint_px[1] + _HINT_SLACK_PX
     if not any(beyond):
         return hint_px
     margin = _LEAST_MARGIN_PX
@@ -197,7 +199,7 @@ def _widened(
         float(math.ceil(high + margin + _NEAR_MARGIN * (high - low))) if beyond[1] else hint_px[1],
     )
     warnings.warn(
-        f"{name or 'input'}: the pictures show disparities of {low:.0f}..{high:.0f} px, beyond the stated"
+        f"{name or 'input'}: the pictures show disparities of {low:.1f}..{high:.1f} px, beyond the stated"
         f" {hint_px[0]:g}..{hint_px[1]:g} px; widened to {wider[0]:g}..{wider[1]:g} px"
         f" ({advice})",
         MvCodecWarning,

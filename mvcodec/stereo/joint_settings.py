@@ -86,7 +86,7 @@ class JointSettings:
         low=1,
         high=1000,
     )
-    subpixel_steps: int = setting(3, "steps of sub-pixel refinement", low=0, high=20)
+    subpixel_steps: int = setting(2, "steps of sub-pixel refinement", low=0, high=20)
     full_size_steps: int = setting(
         0,
         "steps of it after maps of small copies were brought back; surfaces reach further after these then",
