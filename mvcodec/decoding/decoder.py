@@ -18,6 +18,7 @@ from mvcodec.decoding.enhanced_views import EnhancedViews, WaitingSet
 from mvcodec.decoding.estimated_maps import (
     decoding_matcher,
 )
+from mvcodec.decoding.kept_memory import keep_freed_memory
 from mvcodec.decoding.pipeline import DecodedTracks, Pipeline
 from mvcodec.decoding.tracks import Tracks
 from mvcodec.enhancement import LAYER_TRACK, EnhancementHeader
@@ -82,6 +83,7 @@ class Decoder(Closing):
         self._absent: frozenset[Position] = frozenset()
         self._skipping = False
         check_threads(threads)
+        keep_freed_memory()
         self._threads, self._open = threads, True
         self._reader: McapReader | None = None
         self._frames: slice | None = None
