@@ -11,7 +11,8 @@ import pytest
 from mvcodec.array import Viewpoint
 from mvcodec.errors import SettingError
 from mvcodec.evaluation.quality import QualityMeter
-from mvcodec.frames import DecodedSet, FrameSet
+from mvcodec.frames import DecodedSet, FrameSet, RenderedView
+from mvcodec.kernels.specks import smooth_over
 from mvcodec.layers.refinement import make_matcher
 from mvcodec.scenes.difficult import ARRANGEMENTS
 from mvcodec.scenes.lighting import LightMaps
@@ -87,34 +88,47 @@ def test_nothing_moves_and_the_seed_changes_it() -> None:
 
 
 @cache
-def quality(name: str, matcher: str) -> float:
-    """Luma PSNR of the virtual views, dB, the real cameras uncoded."""
-    scene = make_scene(name)
+def views(
+    name: str, matcher: str, grid: tuple[int, int] | None
+) -> tuple[Scene, dict[tuple[int, int], RenderedView]]:
+    """The virtual views, the real cameras uncoded."""
+    scene = make_scene(name, SceneSettings(grid=grid))
     array, synthesizer = scene.array, Layered()
-    pictures = {view: scene.render(Viewpoint(*view), 0)[0] for view in array.positions}
-    real = {camera: pictures[camera] for camera in array.real}
+    real = {camera: scene.render(Viewpoint(*camera), 0)[0] for camera in array.real}
     range_px = estimate_range(array, [FrameSet(0, 0, real)])
     decoded = DecodedSet(array, 0, 0, real, make_matcher(matcher).match(array, real, range_px), range_px)
-    meter = QualityMeter(array.real)
-    for view in array.positions:
-        if view not in array.real:
-            meter.push(view, pictures[view], synthesizer.render(decoded, Viewpoint(*view)).pixels)
-    found = meter.result().psnr_y.all
-    assert found is not None
-    return found
+    virtual = [view for view in array.positions if view not in array.real]
+    return scene, {view: synthesizer.render(decoded, Viewpoint(*view)) for view in virtual}
+
+
+def quality(name: str, matcher: str, grid: tuple[int, int] | None) -> float:
+    """Their luma PSNR, dB."""
+    scene, made = views(name, matcher, grid)
+    meter = QualityMeter(scene.array.real)
+    for view, found in made.items():
+        meter.push(view, scene.render(Viewpoint(*view), 0)[0], found.pixels)
+    psnr = meter.result().psnr_y.all
+    assert psnr is not None
+    return psnr
+
+
+ARRAYS = [("wires", None), ("mirrors", None), ("studs", None), ("wires", (1, 3)), ("mirrors", (1, 3))]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "matcher", "behind"),
-    [
-        ("wires", "joint", 0.05),
-        ("wires", "balanced", 0.2),
-        ("mirrors", "joint", 0.05),
-        ("mirrors", "balanced", 0.2),
-        ("studs", "joint", 0.05),
-        ("studs", "balanced", 0.2),
-    ],
-)
-def test_views_are_as_good_as_from_plain_maps(name: str, matcher: str, behind: float) -> None:
-    assert quality(name, matcher) >= quality(name, "sgbm") - behind
+@pytest.mark.parametrize(("name", "grid"), ARRAYS, ids=str)
+@pytest.mark.parametrize(("matcher", "behind"), [("joint", 0.05), ("balanced", 0.2)])
+def test_views_are_as_good_as_from_plain_maps(
+    name: str, grid: tuple[int, int] | None, matcher: str, behind: float
+) -> None:
+    assert quality(name, matcher, grid) >= quality(name, "sgbm", grid) - behind
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "grid"), ARRAYS, ids=str)
+@pytest.mark.parametrize("matcher", ["joint", "balanced", "sgbm"])
+def test_no_speck_is_left_in_a_view(name: str, grid: tuple[int, int] | None, matcher: str) -> None:
+    for found in views(name, matcher, grid)[1].values():
+        smooth = found.disparity_px.copy()
+        smooth_over(found.disparity_px, 1.5, 1, 30, smooth, 0, len(smooth))
+        np.testing.assert_array_equal(smooth, found.disparity_px)
