@@ -17,6 +17,7 @@ from plane_scene import Plane, PlaneScene
 
 from mvcodec.array import CameraArray, Viewpoint
 from mvcodec.kernels import prediction_colour, prediction_depth
+from mvcodec.kernels.prediction_moves import UNKNOWN
 from mvcodec.synthesis import prediction
 from mvcodec.synthesis.prediction import PredictionSource, predict, predicted_disparity
 from mvcodec.video.codec import Planes
@@ -24,7 +25,7 @@ from mvcodec.video.colour import to_planes
 from mvcodec.video.vp9_reference import checksum
 from mvcodec.workers import threads
 
-SEEDS, SIZES = st.integers(0, 2**32 - 1), st.tuples(st.integers(1, 12), st.integers(1, 14))
+SEEDS, SIZES = st.integers(0, 2**32 - 1), st.tuples(st.integers(1, 12), st.integers(1, 40))
 SHIFTS = st.tuples(st.integers(-(1 << 17), 1 << 17), st.integers(-(1 << 17), 1 << 17))
 
 
@@ -43,9 +44,10 @@ def test_enlarging_is_its_twin(seed: int, size: tuple[int, int]) -> None:
 @given(SEEDS, SIZES, SHIFTS)
 def test_moving_is_its_twin(seed: int, size: tuple[int, int], shift: tuple[int, int]) -> None:
     values = np.random.default_rng(seed).integers(-200, 400, size, dtype=np.int32)
-    found = np.empty((size[0] + 2, size[1] + 2), np.int32)
+    margin = prediction_depth.MARGIN
+    found = np.empty((size[0] + 2, size[1] + 2 * margin), np.int32)
     prediction_depth.splat(values, *shift, found)
-    np.testing.assert_array_equal(found[1:-1, 1:-1], twins.splat(values, *shift))
+    np.testing.assert_array_equal(found[1:-1, margin:-margin], twins.splat(values, *shift))
 
 
 @settings(max_examples=40, deadline=None)
@@ -53,15 +55,15 @@ def test_moving_is_its_twin(seed: int, size: tuple[int, int], shift: tuple[int, 
 def test_voting_and_filling_are_their_twins(seed: int, size: tuple[int, int], count: int) -> None:
     rng = np.random.default_rng(seed)
     moved = rng.integers(-200, 200, (count, *size), dtype=np.int32)
-    moved[rng.random(moved.shape) < 0.5] = prediction_depth.UNKNOWN
+    moved[rng.random(moved.shape) < 0.5] = UNKNOWN
     weights = rng.integers(1, 5000, count)
-    found = np.empty(size, np.int32)
-    bordered = np.pad(moved, ((0, 0), (1, 1), (1, 1)))
+    found = np.empty(size, np.float32)
+    bordered = np.pad(moved, ((0, 0), (1, 1), (prediction_depth.MARGIN,) * 2))
     prediction_depth.vote(bordered, weights, found, 0, size[0])
     np.testing.assert_array_equal(found, twins.vote(moved, weights))
-    filled = twins.fill(found, -77)
-    prediction_depth.fill(found, -77)
-    np.testing.assert_array_equal(found, filled)
+    filled = np.empty(size, np.int32)
+    prediction_depth.fill(found, -77, filled, 0, size[0])
+    np.testing.assert_array_equal(filled, twins.fill(found.astype(np.int32), -77))
 
 
 @settings(max_examples=25, deadline=None)

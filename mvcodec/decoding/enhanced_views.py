@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mvcodec.array import Position
+from mvcodec.decoding.on_demand import OnDemand
 from mvcodec.enhancement import EnhancedView, EnhancementHeader
 from mvcodec.errors import MissingReference, StreamError
 from mvcodec.frames import DecodedSet, FinishedView
 from mvcodec.stream import Packet, StreamHeader, Track, view_name
 from mvcodec.synthesis.frame_prediction import FramePrediction
+from mvcodec.synthesis.prediction import FINE, IntMap
 from mvcodec.video.codec import Planes
 from mvcodec.video.colour import even_size, to_picture
 from mvcodec.video.track import PredictedTrackDecoder
@@ -77,8 +79,7 @@ class EnhancedViews:
         planes = waiting.planes
         frame = FramePrediction(self._base, planes)
         there = {camera for camera in self._base.array.real if self._base.picture_track(camera) in planes}
-        found: dict[Position, FinishedView] = {}
-        array = self._base.array
+        found: dict[Position, tuple[Planes, IntMap]] = {}
         for each in self._views:
             try:
                 name = label(replace(waiting.first, track=each.track))
@@ -92,10 +93,15 @@ class EnhancedViews:
             self._absent.discard(each.view)
             there.add(each.view)
             frame.add(each.view, picture)
-            fine = frame.disparity(each.view)[: array.height, : array.width]
-            values = fine.astype(np.float32) / np.float32(64)
-            found[each.view] = FinishedView(to_picture(picture, array.width, array.height), values)
-        return replace(waiting.decoded, enhanced=found)
+            found[each.view] = picture, frame.disparity(each.view)
+        # Of views that others build on nobody may want to see a picture.
+        return replace(waiting.decoded, enhanced=OnDemand(found, self._finished))
+
+    def _finished(self, _: Position, coded: tuple[Planes, IntMap]) -> FinishedView:
+        planes, fine = coded
+        width, height = self._base.array.width, self._base.array.height
+        values = fine[:height, :width].astype(np.float32) / np.float32(FINE)
+        return FinishedView(to_picture(planes, width, height), values)
 
     def _decode(
         self,

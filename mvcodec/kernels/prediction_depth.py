@@ -11,21 +11,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvcodec.kernels.view_marks import list_marked
+from mvcodec.kernels.lanes import COUNT
+from mvcodec.kernels.prediction_moves import UNKNOWN, mean_run, move_run
+from mvcodec.kernels.prediction_runs import TOLERANCE
+from mvcodec.kernels.view_marks import list_bits, list_marked
 
 Plane = NDArray[np.uint8]
 IntMap = NDArray[np.int32]
 
-FINE = 64
-HALF_SHIFT = 1 << 15
-UNKNOWN = -(1 << 24)
-"""Exact in float32, too, in which the median sorts it."""
-
-REACH = 35
-"""A moved pixel covers the places within this distance, in FINE-ths."""
-
-TOLERANCE = 96
-"""Disparities that differ by no more are one surface."""
+MARGIN = COUNT
+"""Columns beside a moved map, which runs of pixels may read and write."""
 
 RATIO_NUM, RATIO_DEN = 13, 10
 """A farther surface must weigh this many times a nearer one to outvote it."""
@@ -100,73 +95,30 @@ def splat(disparity: IntMap, shift_x: int, shift_y: int, out: IntMap) -> None:
     Args:
         disparity: int32 (H, W).
         shift_x, shift_y: 65536ths of a pixel that a pixel moves (left, up) for each pixel of disparity.
-        out: int32 (H + 2, W + 2), C-contiguous, overwritten: the view with a border of one pixel, in which
-            what leaves the picture lands; UNKNOWN where nothing does.
+        out: int32 (H + 2, W + 2 MARGIN), C-contiguous, overwritten: the view with a border of one row and
+            MARGIN columns, of which the inner one is where what leaves the picture lands; UNKNOWN where
+            nothing does.
+
+    Raises:
+        ValueError: `out` is of another shape: runs of pixels would be written outside of it.
     """
     height, width = disparity.shape
-    stride = np.int32(width + 2)
+    if out.shape != (height + 2, width + 2 * MARGIN):
+        raise ValueError("a view without its border")
     flat = out.ravel()
     flat[:] = UNKNOWN
-    places = np.empty(width, np.int32)
-    beside, above = np.empty(width, np.int32), np.empty(width, np.int32)
-    chosen = np.empty(width, np.int32)
+    row = np.full(width + COUNT, UNKNOWN, np.int32)
+    size, shifts = (np.int32(width), np.int32(height)), (np.int32(shift_x), np.int32(shift_y))
     for y in range(height):
-        row = disparity[y]
-        _targets(row, y, height, shift_x, shift_y, stride, places, beside, above)
-        count = 0
-        for x in range(width):
-            place = np.uint32(places[x])
-            flat[place] = max(flat[place], row[x])
-            chosen[count] = x
-            count += (beside[x] | above[x]) != 0
-        for x in chosen[:count]:  # again where one of them is 0, which costs less than to ask
-            d = row[x]
-            for step in (beside[x], above[x], np.int32(beside[x] + above[x])):
-                place = np.uint32(places[x] + step)
-                flat[place] = max(flat[place], d)
+        row[:width] = disparity[y]
+        for x in range(0, width, COUNT):
+            move_run(row, flat, x, (np.int32(x), np.int32(y)), size, shifts)
 
 
 @njit(cache=True, nogil=True)
-def _targets(row, y, height, shift_x, shift_y, stride, places, beside, above):  # type: ignore[no-untyped-def]
-    """Where the pixels of a row go, and the steps to the neighbours that they cover too, 0 where none."""
-    fine, half, spill = np.int32(FINE), np.int32(FINE // 2), np.int32(FINE - REACH)
-    right, bottom = np.int32(FINE * row.size), np.int32(FINE * height)
-    by_x, by_y = np.int64(np.int32(shift_x)), np.int64(np.int32(shift_y))
-    for x in range(row.size):  # vectorised: no branch
-        d = np.int64(row[x])
-        at_x = np.int32(FINE * x) - np.int32((by_x * d + HALF_SHIFT) >> 16)
-        at_y = np.int32(FINE * y) - np.int32((by_y * d + HALF_SHIFT) >> 16)
-        at_x, at_y = min(max(at_x, -fine), right), min(max(at_y, -fine), bottom)
-        u, v = (at_x + half) >> np.int32(6), (at_y + half) >> np.int32(6)
-        part_x, part_y = at_x - fine * u, at_y - fine * v
-        places[x] = (v + np.int32(1)) * stride + u + np.int32(1)
-        beside[x] = np.int32(part_x >= spill) - np.int32(part_x <= -spill)
-        above[x] = (np.int32(part_y >= spill) - np.int32(part_y <= -spill)) * stride
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _common(moved, weights, y, mean, marks):  # type: ignore[no-untyped-def]
-    """The cameras' mean for a row, rounded down; marks where they do not say the same surface."""
-    width = mean.size
-    total, sums = np.zeros(width, np.float64), np.zeros(width, np.float64)
-    nearest, farthest = np.full(width, UNKNOWN, np.int32), np.full(width, -UNKNOWN, np.int32)
-    for i in range(len(weights)):
-        row, weight = moved[i, y + 1, 1:-1], np.float64(weights[i])
-        for x in range(width):  # vectorised: no branch
-            known = row[x] > UNKNOWN
-            part = weight if known else 0.0
-            total[x] += part
-            sums[x] += part * np.float64(row[x])
-            nearest[x] = max(nearest[x], row[x])
-            farthest[x] = min(farthest[x], row[x] if known else np.int32(-UNKNOWN))
-    for x in range(width):
-        found = np.floor(sums[x] / max(total[x], 1.0))
-        mean[x] = np.int32(found) if total[x] > 0 else np.int32(UNKNOWN)
-        marks[x] = nearest[x] - farthest[x] > TOLERANCE
-
-
-@njit(cache=True, nogil=True)
-def vote(moved: NDArray[np.int32], weights: NDArray[np.int64], out: IntMap, first: int, last: int) -> None:
+def vote(
+    moved: NDArray[np.int32], weights: NDArray[np.int64], out: NDArray[np.float32], first: int, last: int
+) -> None:
     """One disparity for each pixel from the cameras' moved maps, rows first..last-1.
 
     Disparities within TOLERANCE of the nearest one of their group are one surface: their mean by weight,
@@ -174,19 +126,27 @@ def vote(moved: NDArray[np.int32], weights: NDArray[np.int64], out: IntMap, firs
     RATIO times those of the winner so far.
 
     Args:
-        moved: int32 (N, H + 2, W + 2), see `splat`.
+        moved: int32 (N, H + 2, W + 2 MARGIN), C-contiguous, see `splat`.
         weights: int64 (N,), of the cameras, above 0.
-        out: int32 (H, W), rows first..last-1 overwritten; UNKNOWN where no camera knows.
+        out: float32 (H, W), rows first..last-1 overwritten with whole numbers, which float32 holds exactly
+            below 2^24; UNKNOWN where no camera knows.
     """
     count, width = len(moved), out.shape[1]
     near, weigh = np.empty(count, np.int64), np.empty(count, np.int64)
-    marks, chosen = np.empty(width, np.uint8), np.empty(width, np.int32)
+    flat, parts, step = moved.ravel(), weights.astype(np.float64), moved.shape[1] * moved.shape[2]
+    line, chosen = np.empty(width + COUNT, np.float32), np.empty(width + COUNT, np.int32)
     for y in range(first, last):
-        _common(moved, weights, y, out[y], marks)
-        for x in chosen[: list_marked(marks, chosen)]:
+        start, marked = (y + 1) * moved.shape[2] + MARGIN, 0
+        for x in range(0, width, COUNT):
+            bits = mean_run(flat, parts, line, (start + x, step), x, np.int32(TOLERANCE))
+            marked = list_bits(bits, x, chosen, marked)
+        out[y] = line[:width]
+        for x in chosen[:marked]:
+            if x >= width:
+                break
             known = 0
             for i in range(count):
-                d = np.int64(moved[i, y + 1, x + 1])
+                d = np.int64(moved[i, y + 1, x + MARGIN])
                 if d == UNKNOWN:
                     continue
                 place = known
@@ -215,23 +175,30 @@ def _outvoted(near, weigh, known):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def fill(disparity: IntMap, fallback: int) -> None:
-    """Fill what is unknown in place by the farther end of its gap on the row; whole rows with `fallback`."""
-    height, width = disparity.shape
-    for y in range(height):
-        unknown = 0
+def fill(disparity: NDArray[np.float32], fallback: int, out: IntMap, first: int, last: int) -> None:
+    """Fill what is unknown by the farther end of its gap on the row; whole rows with `fallback`.
+
+    Args:
+        disparity: float32 (H, W), whole numbers or UNKNOWN.
+        out: int32 (H, W), rows first..last-1 overwritten.
+    """
+    width = disparity.shape[1]
+    for y in range(first, last):
+        unknown, line = 0, out[y]
         for x in range(width):  # vectorised
-            unknown += disparity[y, x] == UNKNOWN
+            line[x] = np.int32(disparity[y, x])
+        for x in range(width):  # vectorised
+            unknown += line[x] == UNKNOWN
         x = 0 if unknown else width
         while x < width:
-            if disparity[y, x] != UNKNOWN:
+            if line[x] != UNKNOWN:
                 x += 1
                 continue
             end = x
-            while end < width and disparity[y, end] == UNKNOWN:
+            while end < width and line[end] == UNKNOWN:
                 end += 1
-            left = disparity[y, x - 1] if x > 0 else UNKNOWN
-            right = disparity[y, end] if end < width else UNKNOWN
+            left = line[x - 1] if x > 0 else UNKNOWN
+            right = line[end] if end < width else UNKNOWN
             farther = min(left, right) if min(left, right) != UNKNOWN else max(left, right)
-            disparity[y, x:end] = farther if farther != UNKNOWN else fallback
+            line[x:end] = farther if farther != UNKNOWN else fallback
             x = end

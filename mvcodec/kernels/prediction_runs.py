@@ -33,12 +33,12 @@ UNSEEN = -(1 << 31)
 """Stands for what a camera does not see; no fetch gives it."""
 
 TOLERANCE = 96
-"""A camera sees a pixel where its own disparity differs by no more, in FINE-ths."""
+"""Disparities that differ by no more are one surface, in FINE-ths."""
 
 Fetch = Callable[..., Any]
 
 
-def _split(builder: Any, numbers: Any, count: int) -> list[Any]:
+def split(builder: Any, numbers: Any, count: int) -> list[Any]:
     """The numbers of a tuple."""
     return [builder.extract_value(numbers, number) for number in range(count)]
 
@@ -127,8 +127,8 @@ def _looking(fetch: Fetch, beside: bool, above: bool) -> Any:
 
         def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
             disparity, columns, rows, out = pointers(context, builder, signature, values, 4)
-            x, (luma, own, stride) = values[4], _split(builder, values[5], 3)
-            start, column, row, room = _split(builder, values[6], 4)
+            x, (luma, own, stride) = values[4], split(builder, values[5], 3)
+            start, column, row, room = split(builder, values[6], 4)
 
             def of_axis(array, first, number):  # type: ignore[no-untyped-def]
                 step = builder.mul(room, ir.Constant(room.type, number))
@@ -193,8 +193,8 @@ def _tinting(fetch: Fetch, beside: bool, above: bool) -> Any:
 
         def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
             seen, columns, rows, *both = pointers(context, builder, signature, values, 5)
-            x, (chroma, stride) = values[5], _split(builder, values[6], 2)
-            start, column, row, room = _split(builder, values[7], 4)
+            x, (chroma, stride) = values[5], split(builder, values[6], 2)
+            start, column, row, room = split(builder, values[7], 4)
 
             def of_axis(array, first, number):  # type: ignore[no-untyped-def]
                 step = builder.mul(room, ir.Constant(room.type, number))
@@ -228,7 +228,7 @@ def _tinting(fetch: Fetch, beside: bool, above: bool) -> Any:
     return intrinsic(tint)
 
 
-def _moved(disparity: Lanes, shift: Any, bits: int) -> Lanes:
+def moved(disparity: Lanes, shift: Any, bits: int) -> Lanes:
     """What the shift makes of disparities, in FINE-ths of a sample, rounded."""
     builder, wide = disparity.builder, ir.VectorType(ir.IntType(64), COUNT)
     product = Lanes(builder, builder.sext(disparity.value, wide)) * filled(
@@ -240,17 +240,24 @@ def _moved(disparity: Lanes, shift: Any, bits: int) -> Lanes:
 def _cubic_taps(t: Lanes) -> list[Lanes]:
     """Four taps in 128ths at so many sixteenths, as FORMAT.md rounds them, in two pairs.
 
-    With u = 16 - t they are Keys' polynomials in 320ths; n * 205 >> 16 is n // 320 for all of them.
+    With u = 16 - t they are Keys' polynomials in 320ths. All is 16 bits wide, and n * 205 >> 16 is n // 320
+    for whatever comes; the third one's numerator is moved into their range and back.
     """
+    builder = t.builder
+    t = Lanes(builder, builder.trunc(t.value, ir.VectorType(SHORT, COUNT)))
 
     def rounded(numerator: Lanes) -> Lanes:
-        return ((numerator + 160) * 205) >> 16
+        wide = ir.VectorType(WORD, COUNT)
+        product = Lanes(builder, builder.sext((numerator + 160).value, wide)) * 205
+        return Lanes(builder, builder.trunc((product >> 16).value, t.value.type))
 
     u = t * -1 + 16
-    both = t * u
-    first, last = rounded(both * u * -7), rounded(both * t * -7)
-    third = rounded((u * 13 - 368) * u * u) + 128
-    return [_pair(first, third * -1 - first - last + 128), _pair(third, last)]
+    both = t * u * -7
+    first, last = rounded(both * u), rounded(both * t)
+    third = rounded((u * 13 - 368) * u * u + 320 * 64) + (128 - 64)
+    second = third * -1 - first - last + 128
+    order = [lane + COUNT * half for lane in range(COUNT) for half in range(2)]
+    return [shuffled(*pair, order).as_(WORD) for pair in ((first, second), (third, last))]
 
 
 def _taps(pair: Lanes, downwards: bool) -> Lanes:
@@ -281,10 +288,10 @@ def _placing(downwards: bool) -> Any:
 
         def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
             disparity, out = pointers(context, builder, signature, values, 2)
-            x, (at, room) = values[2], _split(builder, values[3], 2)
-            first, length, shift, step = _split(builder, values[4], 4)
-            moved = _moved(loaded(builder, disparity, x, WORD), shift, 16)
-            nearest, fetched = (moved + FINE // 2) >> FINE_BITS, moved + 2
+            x, (at, room) = values[2], split(builder, values[3], 2)
+            first, length, shift, step = split(builder, values[4], 4)
+            way = moved(loaded(builder, disparity, x, WORD), shift, 16)
+            nearest, fetched = (way + FINE // 2) >> FINE_BITS, way + 2
             corner = fetched >> FINE_BITS
             place = filled(builder, first) + nearest
             if not downwards:
@@ -312,10 +319,10 @@ def _placing_samples(downwards: bool) -> Any:
             disparity, out = pointers(context, builder, signature, values, 2)
             x, (at, room), (shift, step) = (
                 values[2],
-                _split(builder, values[3], 2),
-                _split(builder, values[4], 2),
+                split(builder, values[3], 2),
+                split(builder, values[4], 2),
             )
-            fetched = _moved(loaded(builder, disparity, x, WORD), shift, 17) + 2
+            fetched = moved(loaded(builder, disparity, x, WORD), shift, 17) + 2
             second = ((fetched >> 2) & (PHASES - 1)) * ((1 << TAP_BITS) // PHASES)
             store((fetched >> FINE_BITS) * filled(builder, step), out, at)
             pair = _pair(second * -1 + (1 << TAP_BITS), second)

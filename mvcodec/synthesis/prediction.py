@@ -18,6 +18,9 @@ from mvcodec.array import CameraArray, Position, Viewpoint
 from mvcodec.video.codec import Plane, Planes
 from mvcodec.workers import run_all, run_in_bands
 
+FINE = 64
+"""Disparity is counted in these parts of a pixel."""
+
 SPREAD = 205
 """1024ths of a squared cell; a camera at distance b counts 1 / (SPREAD + 1024 b^2)."""
 
@@ -27,7 +30,7 @@ IntMap = NDArray[np.int32]
 def fine_disparities(codes: Plane, range_px: tuple[float, float]) -> IntMap:
     """Code values of a map as whole 64ths of a pixel: floor(64 (lo + c (hi - lo) / 255) + 1/2)."""
     low, high = range_px
-    table = np.floor(64 * (low + np.arange(256) * (high - low) / 255) + 0.5).astype(np.int32)
+    table = np.floor(FINE * (low + np.arange(256) * (high - low) / 255) + 0.5).astype(np.int32)
     return table[codes]
 
 
@@ -87,19 +90,17 @@ def predicted_disparity(
     range_px: tuple[float, float],
 ) -> IntMap:
     """Disparity at a place from the maps of cameras around it: moved there, put to the vote, filled."""
-    from mvcodec.kernels.prediction_depth import UNKNOWN, fill, splat, vote
+    from mvcodec.kernels.prediction_depth import MARGIN, fill, splat, vote
 
     cameras = sorted(maps)
-    shape = next(iter(maps.values())).shape
-    moved = np.empty((len(cameras), shape[0] + 2, shape[1] + 2), np.int32)
+    height, width = next(iter(maps.values())).shape
+    moved = np.empty((len(cameras), height + 2, width + 2 * MARGIN), np.int32)
     shifts = zip(*(_shift(array, camera, place) for camera in cameras), strict=True)
     run_all(splat, [maps[camera] for camera in cameras], *shifts, moved)
-    voted = np.empty(shape, np.int32)
-    run_in_bands(shape[0], vote, moved, _weights(array, cameras, place), voted)
-    # Whole numbers below 2^24 are exact in float32.
-    found = cv2.medianBlur(voted.astype(np.float32), 3).astype(np.int32)
-    assert np.float32(UNKNOWN) == UNKNOWN
-    fill(found, int(fine_disparities(np.zeros((1, 1), np.uint8), range_px)[0, 0]))
+    voted, found = np.empty((height, width), np.float32), np.empty((height, width), np.int32)
+    run_in_bands(height, vote, moved, _weights(array, cameras, place), voted)
+    lowest = fine_disparities(np.zeros((1, 1), np.uint8), range_px)
+    run_in_bands(height, fill, cv2.medianBlur(voted, 3), int(lowest[0, 0]), found)
     return found
 
 

@@ -198,11 +198,11 @@ def _joined(planes: Planes) -> libvpx.Bytes:
     """I420 in one piece, of `frame_size`: the last column and row are repeated."""
     height, width = planes.y.shape
     right, below = (to - of for to, of in zip(frame_size((width, height)), (width, height), strict=True))
-    padded = [
-        np.pad(plane, ((0, below // part), (0, right // part)), mode="edge").ravel()
-        for plane, part in ((planes.y, 1), (planes.u, 2), (planes.v, 2))
-    ]
-    return np.concatenate(padded)
+    parts = [planes.y, planes.u, planes.v]
+    if right or below:
+        margins = [((0, below // part), (0, right // part)) for part in (1, 2, 2)]
+        parts = [np.pad(plane, margin, mode="edge") for plane, margin in zip(parts, margins, strict=True)]
+    return np.concatenate([plane.ravel() for plane in parts])
 
 
 def _cropped(planes: tuple[libvpx.Bytes, libvpx.Bytes, libvpx.Bytes], size: tuple[int, int]) -> Planes:
