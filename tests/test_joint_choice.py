@@ -152,4 +152,26 @@ def test_a_fraction_of_a_qp_is_a_layer_of_its_own(folder: Path, tmp_path: Path) 
         sizes.append(read_info(tmp_path / "x.mcap").bits.enhancement)
     assert sizes[0] > sizes[1] > sizes[2]
     beyond = fails(2, "encode", folder, tmp_path / "y.mcap", "--enhance", "51.5")
-    assert "--enhance: found 51.5, expected 1..51" in beyond
+    assert "--enhance: found 51.5, expected 1..51, +QPS" in beyond
+
+
+def test_within_a_bit_rate_the_layer_follows_the_pictures(folder: Path, tmp_path: Path) -> None:
+    options = ["--enhance", "auto", "--preset", "ultrafast", "--matcher", "sgbm", "--json"]
+    found = {}
+    for kbps in ("100", "4000"):
+        output = succeeds("encode", folder, tmp_path / "x.mcap", "--bitrate", kbps, "-y", *options)
+        document = json.loads(output)
+        found[kbps] = document["chosen"]["enhance"]
+        layer = read_info(tmp_path / "x.mcap").layer
+        assert (None if layer is None else layer.settings["enhance"]) == found[kbps]
+    assert found["100"] is None  # where bits are few no layer pays
+    assert float(found["4000"]) > -10
+
+
+def test_a_layer_is_so_many_qps_coarser_than_the_pictures() -> None:
+    assert EncoderConfig(qp=30, enhance="+2.5").layer_quality(5, 4) == 32.5
+    assert EncoderConfig(qp=30, enhance="-2").layer_quality(5, 4) == 28
+    assert EncoderConfig(qp=50, enhance="+9").layer_quality(5, 4) == 51
+    assert EncoderConfig(bitrate_kbps=100, enhance="+2").shared_kbps == 100
+    with pytest.raises(SettingError, match=r"enhance: found \+x, expected a QP, \+QPS or auto"):
+        EncoderConfig(enhance="+x")

@@ -25,7 +25,7 @@ def test_auto_follows_the_quality_of_the_pictures_and_how_many_views_build_on_ea
     assert EncoderConfig(qp=27, enhance=30).layer_quality(21, 4) == 30
     assert EncoderConfig(bitrate_kbps=100, enhance="auto").layer_quality(21, 4) is None
     assert EncoderConfig(qp=27).layer_quality(21, 4) is None
-    with pytest.raises(SettingError, match="enhance: found best, expected a QP, or auto"):
+    with pytest.raises(SettingError, match="enhance: found best, expected a QP, \\+QPS or auto"):
         EncoderConfig(enhance="best")
 
 

@@ -44,7 +44,7 @@ from mvcodec.cli.live_view_option import add_live_view, live_view
 from mvcodec.cli.paths import add_overwrite, check_file_target, local_path
 from mvcodec.cli.picture_options import add_picture_options, reading_of
 from mvcodec.cli.progress import CodingProgress, stage
-from mvcodec.cli.quality_target import config_for_quality
+from mvcodec.cli.quality_target import config_for_quality, config_for_rate
 from mvcodec.cli.rig_option import add_rig, rectified_source
 from mvcodec.cli.safety import add_chunk_ms
 from mvcodec.cli.segment_options import add_segment, check_continues, plan
@@ -55,6 +55,7 @@ from mvcodec.cli.time_options import add_time_options, timing_of
 from mvcodec.container import McapWriter, StreamInfo, read_info
 from mvcodec.decoding.decoded_source import DecodedSource
 from mvcodec.depth import require_calibration
+from mvcodec.encoding.config import AUTO
 from mvcodec.encoding.encoder import Encoder, EncoderConfig
 from mvcodec.encoding.speed_choice import FOR_LIVE
 from mvcodec.errors import MvCodecError, MvCodecWarning, SettingError
@@ -201,6 +202,8 @@ def _encode_files(arguments: argparse.Namespace) -> tuple[McapWriter | None, dic
     found: dict[str, Any] = {}
     if arguments.target_psnr is not None:
         config, found = config_for_quality(source, chosen, config, arguments)
+    elif config.enhance == AUTO and config.rate.bitrate_kbps is not None:
+        config, found = config_for_rate(source, chosen, config, arguments)
     with live_view(arguments) as view:
         return _encode(source, array, chosen, config, arguments, view), found
 

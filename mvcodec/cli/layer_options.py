@@ -14,7 +14,7 @@ from mvcodec.settings import settings_of
 
 def add_layer(parser: argparse.ArgumentParser) -> None:
     """The options of the enhancement layer."""
-    add_setting(parser, EncoderConfig, "enhance", parse=_qp, metavar="QP|auto")
+    add_setting(parser, EncoderConfig, "enhance", parse=_qp, metavar="QP|+QPS|auto")
     parser.add_argument(
         OPTIONS["enhance_views"],
         type=position,
@@ -34,9 +34,11 @@ def add_no_enhancement(parser: argparse.ArgumentParser) -> None:
 
 def _qp(text: str) -> float | str:
     try:
-        return text if text == AUTO else float(text) if "." in text else int(text)
+        if text == AUTO or text[:1] in ("+", "-"):
+            return text
+        return float(text) if "." in text else int(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected a QP or {AUTO}") from None
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a QP, +QPS or {AUTO}") from None
 
 
 def layer_settings(arguments: argparse.Namespace) -> dict[str, Any]:

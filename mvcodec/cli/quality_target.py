@@ -1,4 +1,4 @@
-"""``--target-psnr``: the settings that reach a quality, looked for, told and recorded."""
+"""``--target-psnr``, ``--bitrate`` with a layer: settings that are found by trials, told and recorded."""
 
 from __future__ import annotations
 
@@ -38,6 +38,25 @@ def config_for_quality(
             f" found by coding a few frame sets {record['codings']} times"
         )
     return found, record
+
+
+def config_for_rate(
+    source: ArraySource, chosen: range, config: EncoderConfig, arguments: argparse.Namespace
+) -> tuple[EncoderConfig, dict[str, Any]]:
+    """The settings with the layer, or without one, that goes best with ``--bitrate``, and the same record.
+
+    Raises:
+        SettingError, InputError: as `config_for_quality`.
+    """
+    from mvcodec.evaluation.joint_choice import choose_for_rate
+
+    with progress("look for the layer", None, quiet=arguments.quiet, unit="coding") as bar:
+        synthesizer = make_synthesizer(DEFAULT_SYNTHESIZER)
+        found = choose_for_rate(source, chosen, config, synthesizer, bar.update)
+    if not arguments.quiet and not arguments.json:
+        layer = "no layer" if found.config.enhance is None else f"layer {found.config.enhance}"
+        print(f"{layer}: about {found.psnr_y:.1f} dB, found by coding 2 frame sets {found.codings} times")
+    return found.config, _record(source, found.config, found.psnr_y, found.codings)
 
 
 def _one_qp(

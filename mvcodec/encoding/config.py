@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import InitVar, dataclass, fields, replace
 
 from mvcodec.array import CameraArray, Position
@@ -124,8 +125,8 @@ class EncoderConfig:
         None,
         "add an enhancement layer: virtual views whose originals are in the input, coded from their synthesis"
         " with about the quality of this QP, which may have a fraction; the base stays as it is without."
-        " auto: what goes best with the pictures' quantiser; beside a bit rate both together hold it; for a"
-        " quality asked for both are chosen together",
+        " +QPS: so many, on libx264's scale, more than the pictures'. auto: what goes best with the pictures'"
+        " quantiser, or with the quality or bit rate asked for. With +QPS and auto both hold a bit rate",
     )
     enhance_views: tuple[Position, ...] | None = setting(
         None,
@@ -170,10 +171,10 @@ class EncoderConfig:
 
     def _check_enhance(self, max_qp: int) -> None:
         asked = self.enhance
-        if isinstance(asked, str) and asked != AUTO:
-            raise SettingError("enhance", asked, f"a QP, or {AUTO}")
+        if isinstance(asked, str) and asked != AUTO and not re.fullmatch(r"[+-]\d{1,2}(\.\d+)?", asked):
+            raise SettingError("enhance", asked, f"a QP, +QPS or {AUTO}")
         if isinstance(asked, float) and not 1 <= asked <= max_qp:
-            raise SettingError("enhance", asked, f"1..{max_qp}, or {AUTO}")
+            raise SettingError("enhance", asked, f"1..{max_qp}, +QPS or {AUTO}")
         check_qp("enhance", asked if isinstance(asked, int) else None, max_qp)
 
     @classmethod
@@ -202,16 +203,21 @@ class EncoderConfig:
         Args:
             views: of the layer; cameras: real ones.
         """
-        if self.enhance != AUTO or self.quality is None:
-            return None if isinstance(self.enhance, str) else self.enhance
+        if not isinstance(self.enhance, str):
+            return self.enhance
+        if self.quality is None:
+            return None
         codec = find_codec(self.codec)
-        offset = min(max(LAYER_SLOPE * math.log2(views / cameras), 0.0), MOST_LAYER_OFFSET)
-        return min(self.quality + offset * codec.qp_line[0], codec.max_qp)
+        if self.enhance == AUTO:
+            offset = min(max(LAYER_SLOPE * math.log2(views / cameras), 0.0), MOST_LAYER_OFFSET)
+        else:
+            offset = float(self.enhance)
+        return min(max(self.quality + offset * codec.qp_line[0], 1.0), codec.max_qp)
 
     @property
     def shared_kbps(self) -> float | None:
         """A bit rate that one quality of several tracks has to hold, since they build on each other."""
-        several = self.prediction != "none" or self.enhance == AUTO
+        several = self.prediction != "none" or isinstance(self.enhance, str)
         return self.rate.bitrate_kbps if several else None
 
     def with_quality(self, qp: int, header: StreamHeader) -> EncoderConfig:

@@ -14,7 +14,7 @@ from mvcodec.array import CameraArray, Position
 from mvcodec.depth import depth_mm, warn_behind_infinity
 from mvcodec.encoding.coders import Coders
 from mvcodec.encoding.coding_error import coding_error
-from mvcodec.encoding.config import AUTO, EncoderConfig, default_gop, find_matcher, matcher_name
+from mvcodec.encoding.config import EncoderConfig, default_gop, find_matcher, matcher_name
 from mvcodec.encoding.enhancer import enhanced_views
 from mvcodec.encoding.predicted_cameras import prediction_order
 from mvcodec.encoding.stream_rate import StreamRate
@@ -153,7 +153,7 @@ class Encoder:
 
     def _bits(self, packets: Iterable[Packet]) -> int:
         """What counts of them for the bit rate: a layer whose quality is given comes on top."""
-        uncounted = () if self.config.enhance == AUTO else (TrackKind.LAYER, TrackKind.ENHANCED)
+        uncounted = () if isinstance(self.config.enhance, str) else (TrackKind.LAYER, TrackKind.ENHANCED)
         return 8 * sum(len(packet.data) for packet in packets if packet.track.kind not in uncounted)
 
     def _coders_at_hand(self, keyframe: bool) -> Coders:

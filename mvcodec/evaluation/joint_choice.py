@@ -98,6 +98,42 @@ def choose_together(
         return Chosen(best.config, best.psnr_y, best.bits, probes.count + checks.count)
 
 
+def choose_for_rate(
+    source: ArraySource,
+    chosen: range,
+    config: EncoderConfig,
+    synthesizer: Synthesizer,
+    on_coding: Callable[[], object] = lambda: None,
+) -> Chosen:
+    """Choose the layer, or none, that is best beside pictures coded within a bit rate.
+
+    Args:
+        config: with a bit rate and an enhancement layer, whose QP is replaced by one that follows the
+            pictures'.
+
+    Returns:
+        `config` with that layer, and what a trial of about that quality and rate was like.
+
+    Raises, and the other arguments: as `choose_together`.
+    """
+    assert config.rate.bitrate_kbps is not None
+    array = source.array
+    per_set = 1000 * config.rate.bitrate_kbps / array.fps
+    settled = replace(config, disparity_scale=config.scale_for(array))
+    if config.disparity_cameras in (None, AUTO):
+        settled = replace(settled, disparity_cameras=config.cameras_for(array))
+    with tempfile.TemporaryDirectory() as folder, MapSpool(Path(folder)) as spool:
+        trials = Trials(source, chosen, probed(chosen), synthesizer, spool, on_coding)
+        search = _Search(source, settled, 0.0, trials, trials)
+        best = search.cheapest_at(per_set)
+        if best.config.enhance is None:
+            found = replace(config, enhance=None, enhance_views=None, enhance_chain=None)
+        else:
+            offset = (_layer_qp(best) - _base_qp(best)) / find_codec(config.codec).qp_line[0]
+            found = replace(config, enhance=f"{offset:+.1f}")
+        return Chosen(found, best.psnr_y, best.bits, trials.count)
+
+
 class _Search:
     """One search; the slopes are on the codec's own scale of QPs."""
 
@@ -114,7 +150,25 @@ class _Search:
 
     def best(self) -> Trial:
         """What costs least, and reaches the target."""
-        best = start = self._brought(self._about())
+        best = self._cheapest(self._about())
+        return self._finished_alone(best) if best.config.enhance is None else self._finished(best)
+
+    def cheapest_at(self, bits: float) -> Trial:
+        """What costs least at the quality that the model's layer has with about so many bits a frame set."""
+        scale = self._codec.qp_line[0]
+        qp = round(scale * START[0] + self._codec.qp_line[1])
+        for _ in range(MOST_ROUNDS):
+            trial = self._try(self._with_model(qp))
+            step = round(HALVING * scale * math.log2(trial.bits / bits))
+            before, qp = qp, min(max(qp + step, 1), self._max_qp)
+            if qp == before:
+                break
+        self._target = trial.psnr_y
+        return self._cheapest(trial)
+
+    def _cheapest(self, trial: Trial) -> Trial:
+        """The trial near the target that would cost least there, beginning with one."""
+        best = start = self._brought(trial)
         for direction in (1, -1):
             moved = self._moved(best, direction)
             while moved is not None and self._pays(moved, best):
@@ -124,8 +178,7 @@ class _Search:
         if self._config.disparity_scale is None and best.config.scale_for(self._array) == 1:
             halved = self._brought(self._try(replace(best.config, disparity_scale=2)))
             best = halved if self._pays(halved, best) else best
-        alone = self._alone(best)
-        return self._finished(best) if alone is None else self._finished_alone(alone)
+        return self._alone(best) or best
 
     def _about(self) -> Trial:
         """A base with the layer that the model has for it, not far from the target."""
