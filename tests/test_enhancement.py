@@ -193,7 +193,7 @@ def test_what_a_view_builds_on_can_be_kept_few(most: int | None) -> None:
     header = EnhancementHeader(layer_order(array, virtual, most))
     others = [len(header.needed([view])) - 1 for view in virtual]
     assert len(header.views) == len(virtual)
-    assert max(others) == (6 if most is None else most)
+    assert max(others) == (4 if most is None else most)
 
 
 def test_views_that_others_build_on_are_coded_finer() -> None:
