@@ -59,7 +59,7 @@ def layer_order(
     """The view that is farthest from all that is decoded comes next, from what is nearest to it.
 
     A last reference that would have others decoded for its sake alone is left out: who looks at a single
-    view decodes up to a quarter less then, for some 0.3 % of a file's bits (`docs/measurements.md`).
+    view decodes up to a quarter less then, for some 0.1 % of a file's bits (`docs/measurements.md`).
 
     Args:
         most: other views of the layer that one may build on, by way of others too; None: any number.
