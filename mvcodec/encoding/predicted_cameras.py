@@ -30,12 +30,17 @@ LAYER_LINE = (2.0, -25.0)
 
 
 def prediction_order(array: CameraArray) -> tuple[PredictedCamera, ...]:
-    """Every real camera but the first, row by row, each from those around it that come before it."""
+    """Every real camera but the first, row by row, each from those around it that come before it.
+
+    Where one above and one beside it are there, those at the diagonal are left out: they are farther away.
+    """
     rows, cols = array.real_rows, array.real_cols
     found = []
     for down, row in enumerate(rows):
         for across, col in enumerate(cols):
-            around = [(down - 1, across - 1), (down - 1, across), (down - 1, across + 1), (down, across - 1)]
+            around = [(down - 1, across), (down, across - 1)]
+            if down == 0 or across == 0:
+                around.append((down - 1, across + 1))
             references = tuple(
                 (rows[y], cols[x]) for y, x in around if 0 <= y < len(rows) and 0 <= x < len(cols)
             )
