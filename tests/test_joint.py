@@ -256,7 +256,7 @@ def test_lone_camera_is_flat_at_the_far_end_of_a_negative_range() -> None:
         (lambda: JointSettings(subpixel_steps=-1), "JointSettings.subpixel_steps: found -1"),
         (lambda: JointSettings(row_cost=float("nan")), "JointSettings.row_cost: found nan"),
         (lambda: JointSettings(median_size=4), "JointSettings.median_size: found 4, expected one of 0, 3, 5"),
-        (lambda: JointSettings(bit_cost=60), "the highest cost: found 682, expected at most 152"),
+        (lambda: JointSettings(bit_cost=60), "the highest cost: found 1342, expected at most 156"),
     ],
 )
 def test_bad_settings_are_named(make: Callable[[], JointSettings], text: str) -> None:

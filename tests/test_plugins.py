@@ -115,7 +115,7 @@ def test_a_wrong_matcher_says_what_is_wrong_with_it(specification: str, message:
     ("given", "shortest"),
     [
         ("joint", "joint"),
-        ("joint:subpixel_steps=2,jump=85", "joint"),
+        ("joint:subpixel_steps=2,jump=82", "joint"),
         ("sad:subpixel=on,window=09+dlr:jump_px=1.5", "sad:window=9+dlr"),
         ("sad:subpixel=off", "sad:subpixel=no"),
     ],

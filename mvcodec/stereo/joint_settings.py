@@ -22,10 +22,10 @@ class JointSettings:
     """
 
     colour_limit: int = setting(30, "most that the colour difference counts", low=0, high=60)
-    census_x: int = setting(2, "half the census window's width, px", low=1, high=7)
-    census_y: int = setting(2, "half the census window's height, px", low=1, high=7)
-    bit_cost: int = setting(4, "cost of each bit of census distance", low=0, high=60)
-    most_bits: int = setting(10, "bits that count at most", low=0, high=64)
+    census_x: int = setting(4, "half the census window's width, px", low=1, high=7)
+    census_y: int = setting(3, "half the census window's height, px", low=1, high=7)
+    bit_cost: int = setting(2, "cost of each bit of census distance", low=0, high=60)
+    most_bits: int = setting(21, "bits that count at most", low=0, high=64)
     lone_cost: int = setting(12, "added where one partner alone must see the pixel", low=0, high=50)
     blind_cost: int = setting(
         40,
@@ -35,8 +35,8 @@ class JointSettings:
         high=100,
     )
     outside_cost: int = setting(50, "of a disparity that leaves every partner's picture", low=0, high=127)
-    small_step: int = setting(18, "penalty P1 of semi-global matching", low=0, high=100)
-    jump: int = setting(85, "penalty P2 of semi-global matching", low=0, high=150)
+    small_step: int = setting(17, "penalty P1 of semi-global matching", low=0, high=100)
+    jump: int = setting(82, "penalty P2 of semi-global matching", low=0, high=150)
     least_jump: int = setting(25, "what is left of P2 at an edge of the picture", low=0, high=150)
     contrast: float = setting(8, "grey levels that halve P2", low=1e-3, high=255)
     diagonals: bool = setting(True, "paths run along diagonals too")
@@ -123,10 +123,20 @@ class JointSettings:
         return Penalties(*steps, self.contrast, self.diagonals)
 
 
-BALANCED: dict[str, Any] = {"median_size": 3, "subpixel_steps": 0, "full_size_steps": 2}
+SMALL_CENSUS: dict[str, Any] = {
+    "census_x": 2,
+    "census_y": 2,
+    "bit_cost": 4,
+    "most_bits": 10,
+    "small_step": 18,
+    "jump": 85,
+}
+
+BALANCED: dict[str, Any] = {**SMALL_CENSUS, "median_size": 3, "subpixel_steps": 0, "full_size_steps": 2}
 """Of what is matched in small copies (`mvcodec.stereo.realtime`)."""
 
 REALTIME: dict[str, Any] = {
+    **SMALL_CENSUS,
     "diagonals": False,
     "completion": False,
     "self_check": True,
