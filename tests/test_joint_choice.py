@@ -175,3 +175,5 @@ def test_a_layer_is_so_many_qps_coarser_than_the_pictures() -> None:
     assert EncoderConfig(bitrate_kbps=100, enhance="+2").shared_kbps == 100
     with pytest.raises(SettingError, match=r"enhance: found \+x, expected a QP, \+QPS or auto"):
         EncoderConfig(enhance="+x")
+    with pytest.raises(SettingError, match=r"enhance: found \+99, expected a QP, auto, or -24..\+24"):
+        EncoderConfig(enhance="+99")

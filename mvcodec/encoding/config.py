@@ -39,6 +39,9 @@ LAYER_SLOPE, MOST_LAYER_OFFSET = 2.5, 6.0
 """What the layer's QP is more than the pictures', on libx264's scale: LAYER_SLOPE for each doubling of the
 views that build on a real camera, within what was measured; fitted in `docs/prediction.md`."""
 
+MOST_GIVEN_OFFSET = 24
+"""How far a user may ask for the layer's QP to be from the pictures': more is a slip of the hand."""
+
 RATIO_CODECS = ("h264", "hevc")
 """Codecs that can be told how much finer keyframes shall be."""
 
@@ -173,6 +176,9 @@ class EncoderConfig:
         asked = self.enhance
         if isinstance(asked, str) and asked != AUTO and not re.fullmatch(r"[+-]\d{1,2}(\.\d+)?", asked):
             raise SettingError("enhance", asked, f"a QP, +QPS or {AUTO}")
+        if isinstance(asked, str) and asked != AUTO and abs(float(asked)) > MOST_GIVEN_OFFSET:
+            expected = f"a QP, {AUTO}, or -{MOST_GIVEN_OFFSET}..+{MOST_GIVEN_OFFSET}"
+            raise SettingError("enhance", asked, expected)
         if isinstance(asked, float) and not 1 <= asked <= max_qp:
             raise SettingError("enhance", asked, f"1..{max_qp}, +QPS or {AUTO}")
         check_qp("enhance", asked if isinstance(asked, int) else None, max_qp)
