@@ -267,6 +267,20 @@ def test_the_bar_shows_a_small_picture_and_a_clip_and_the_picture_are_saved(
     assert np.mean(pictures[-1]) > 20
 
 
+def test_a_clip_of_which_nothing_was_recorded_is_not_saved(page: Page, server: Running) -> None:
+    show(page, server, MIDDLE)
+    page.evaluate("""() => {
+        window.MediaRecorder = class {
+            static isTypeSupported() { return true; }
+            start() {}
+            stop() { this.onstop(); }
+        };
+    }""")
+    toggle_menu(page)
+    page.get_by_text("Save clip").dispatch_event("click")
+    expect(page.get_by_text("The browser recorded nothing")).to_be_visible(timeout=20_000)
+
+
 def test_another_file_is_decoded_by_the_page(page: Page, server: Running) -> None:
     show(page, server, MIDDLE)
     before = pixels_of(page).shape

@@ -131,8 +131,8 @@ export class Commands {
     const engine = this.#open;
     if (engine === undefined) return;
     this.#answers.tell(TEXTS.recording);
-    await saveLoop(engine);
-    this.#answers.tell(undefined);
+    await saveLoop(engine)
+      .then(() => this.#answers.tell(undefined), (error: Error) => this.#answers.tell(error.message));
   }
 
   async copyLink(): Promise<void> {

@@ -4,6 +4,13 @@ import type { Pixels } from "../synthesis/renderer.ts";
 import { element } from "./dom.ts";
 import type { Engine } from "./engine.ts";
 import { viewText } from "./format.ts";
+import { TEXTS } from "./texts.ts";
+
+const LONGEST_BEGINNING_S = 3;
+
+function wait(seconds: number): Promise<void> {
+  return new Promise((resolve) => setTimeout(resolve, seconds * 1000));
+}
 
 /** Offer a file for saving. */
 function save(blob: Blob, name: string): void {
@@ -27,12 +34,20 @@ async function saveClip(canvas: HTMLCanvasElement, seconds: number, name: string
   const stream = canvas.captureStream();
   const recorder = new MediaRecorder(stream, { ...(type && { mimeType: type }), videoBitsPerSecond: 8e6 });
   const parts: Blob[] = [];
-  recorder.ondataavailable = ({ data }) => parts.push(data);
   const isDone = new Promise((resolve) => (recorder.onstop = resolve));
-  recorder.start(500);
-  setTimeout(() => recorder.stop(), seconds * 1000);
+  // A browser that is busy may take longer than a short clip lasts until the first picture is coded.
+  const hasBegun = new Promise<void>((resolve) => {
+    recorder.ondataavailable = ({ data }) => {
+      parts.push(data);
+      if (data.size > 0) resolve();
+    };
+  });
+  recorder.start(100);
+  await Promise.all([wait(seconds), Promise.race([hasBegun, wait(seconds + LONGEST_BEGINNING_S)])]);
+  recorder.stop();
   await isDone;
   stream.getTracks().forEach((track) => track.stop());
+  if (parts.every((part) => part.size === 0)) throw new Error(TEXTS.nothingRecorded);
   save(new Blob(parts, { type: recorder.mimeType }), `${name}.${recorder.mimeType.includes("mp4") ? "mp4" : "webm"}`);
 }
 

@@ -30,6 +30,7 @@ export const TEXTS = {
   linkCopied: "Link copied",
   openFile: "Open a file",
   recording: "Recording until the end of the loop",
+  nothingRecorded: "The browser recorded nothing. Try again when it is less busy",
   live: "live",
   noFile: "Drop an .mcap file here, or open one",
   noMaps: "This file has no disparity maps: the nearest camera is shown",
