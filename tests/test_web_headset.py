@@ -137,9 +137,11 @@ def test_ending_gives_the_page_back(page: Page, site: Site) -> None:
     waits_for(page, "shown.immersed === null")
     page.evaluate("document.querySelector('mvcodec-player').settled()")
     assert page.evaluate("document.querySelector('mvcodec-player').shown.view") == {"row": 1, "col": 1}
-    # A draft may come between, where the headset's last pictures are decoded only now.
-    page.wait_for_function("""() => {
-        const { width, height } = document.querySelector("mvcodec-player").shadowRoot.querySelector("canvas");
+    # The headset's last pictures may be decoded, or drawn by what stands in for one, only now: asked again.
+    page.wait_for_function("""async () => {
+        const player = document.querySelector("mvcodec-player");
+        await player.settled();
+        const { width, height } = player.shadowRoot.querySelector("canvas");
         return width === 64 && height === 48;
     }""")
     put_headset_on(page)  # and once more
