@@ -263,7 +263,7 @@ def test_the_bar_shows_a_small_picture_and_a_clip_and_the_picture_are_saved(
         page.get_by_text("Save clip").dispatch_event("click")
     with av.open(io.BytesIO(Path(download.value.path()).read_bytes()), "r") as container:
         pictures = [frame.to_ndarray(format="gray") for frame in container.decode(video=0)]
-    assert pictures  # how many there are is how quickly this machine draws
+    assert len(pictures) >= 2
     assert np.mean(pictures[-1]) > 20
 
 

@@ -28,8 +28,8 @@ export async function savePicture(pixels: Pixels, name: string): Promise<void> {
   save(await canvas.convertToBlob({ type: "image/png" }), `${name}.png`);
 }
 
-/** Record what a canvas shows for some seconds and offer it as WebM (MP4 where there is no WebM). */
-async function saveClip(canvas: HTMLCanvasElement, seconds: number, name: string): Promise<void> {
+/** Record what a canvas shows for some seconds, from `play` on, and offer it as WebM (MP4 where there is no WebM). */
+async function saveClip(canvas: HTMLCanvasElement, play: () => void, seconds: number, name: string): Promise<void> {
   const type = ["video/webm;codecs=vp9", "video/webm", "video/mp4"].find((one) => MediaRecorder.isTypeSupported(one));
   const stream = canvas.captureStream();
   const recorder = new MediaRecorder(stream, { ...(type && { mimeType: type }), videoBitsPerSecond: 8e6 });
@@ -43,6 +43,7 @@ async function saveClip(canvas: HTMLCanvasElement, seconds: number, name: string
     };
   });
   recorder.start(100);
+  play(); // behind it, so that the first pictures are recorded too
   await Promise.all([wait(seconds), Promise.race([hasBegun, wait(seconds + LONGEST_BEGINNING_S)])]);
   recorder.stop();
   await isDone;
@@ -57,8 +58,7 @@ export async function saveLoop(engine: Engine): Promise<void> {
   const { from, to } = playback.section ?? { from: 0, to: engine.timeOf(engine.count - 1) + 1 / header.fps };
   engine.record(true);
   await engine.seek(engine.frameAt(from));
-  engine.play();
-  await saveClip(engine.canvas, Math.max((to - from) / playback.speed, 0.2), header.name || "view").finally(() => engine.record(false));
+  await saveClip(engine.canvas, () => engine.play(), Math.max((to - from) / playback.speed, 0.2), header.name || "view").finally(() => engine.record(false));
 }
 
 /** The page's address with a view and a time, which leads back to them. */
