@@ -16,22 +16,26 @@ UNKNOWN = -1e9
 """Stands for a disparity that no camera knows; below any real one."""
 
 
-def _move_run(_typing, disparity, out, x, y, width, height, shift_x, shift_y, spill):  # type: ignore[no-untyped-def]
+def _move_run(_typing, disparity, out, start, x, y, width, height, shift_x, shift_y, spill, rows):  # type: ignore[no-untyped-def]
     """Move sixteen pixels of a map's row to a view, nearest surface last; see `view_depth.splat`.
 
     Args:
         disparity: float32, the row from its first pixel on and COUNT - 1 numbers more, NaN.
-        out: flat float32, the view with its border.
+        out: flat float32, rows of the view with its border.
+        start: intp, index of their first number.
         x, y: int32, the first pixel.
         width, height: int32, of the map.
         shift_x, shift_y: float32, px that a pixel moves (left, up) for each px of disparity.
         spill: float32, px beyond a pixel's middle from which on its neighbour is covered too.
+        rows: three int32: the first and the last row of the view, counted with its border, that are written
+            to; and the bits of such a row's number that say which row of `out` it is.
     """
-    arguments = disparity, out, x, y, width, height, shift_x, shift_y, spill
+    arguments = disparity, out, start, x, y, width, height, shift_x, shift_y, spill, rows
 
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
         disparity, out = pointers(context, builder, signature, values, 2)
-        x, y, width, height, shift_x, shift_y, spill = values[2:]
+        start, x, y, width, height, shift_x, shift_y, spill, rows = values[2:]
+        least, most, bits = (filled(builder, builder.extract_value(rows, number)) for number in range(3))
         index = ir.IntType(64)
         d = loaded(builder, disparity, builder.sext(x, index), FLOAT)
         known = d.is_("==", d)
@@ -48,10 +52,14 @@ def _move_run(_typing, disparity, out, x, y, width, height, shift_x, shift_y, sp
 
         column, right = along(filled(builder, builder.sitofp(x, FLOAT)) + lanes, shift_x, width)
         row, down = along(filled(builder, builder.sitofp(y, FLOAT)), shift_y, height)
-        apart = row * filled(builder, stride) + column + COUNT - 1 - constant(builder, WORD, range(COUNT))
+        column = column + COUNT - 1 - constant(builder, WORD, range(COUNT))
+
+        def there_of(row, column):  # type: ignore[no-untyped-def]
+            """How far from their places the pixels land, and which of them are written."""
+            return (row & bits) * filled(builder, stride) + column, row.is_(">=", least) & row.is_("<=", most)
 
         def work(offset, lanes):  # type: ignore[no-untyped-def]
-            place, said = builder.sext(offset, index), d.where(lanes, UNKNOWN)
+            place, said = builder.add(start, builder.sext(offset, index)), d.where(lanes, UNKNOWN)
             there = loaded(builder, out, place, FLOAT)
             store(there.most(said), out, place)
 
@@ -66,14 +74,16 @@ def _move_run(_typing, disparity, out, x, y, width, height, shift_x, shift_y, sp
             """Which neighbour is: -1, 1, 0 for none."""
             return one.where(part.is_(">=", spill)) - one.where((part * -1.0).is_(">=", spill))
 
-        rounds(builder, apart, known, work)
+        apart, written = there_of(row, column)
+        rounds(builder, apart, known & written, work)
         with some(right.size().most(down.size()).is_(">=", spill)):  # one test: most pixels cover one place
             beside, above = covered_too(right), covered_too(down)
             aside, over = beside.is_("!=", 0) & known, above.is_("!=", 0) & known
-            above_by = above * filled(builder, stride)
-            for moved, also in ((beside, aside), (above_by, over), (beside + above_by, aside & over)):
-                with some(also):
-                    rounds(builder, apart + moved, also, work)
+            others = (row, column + beside, aside), (row + above, column, over)
+            for to_row, to_column, also in (*others, (row + above, column + beside, aside & over)):
+                apart, written = there_of(to_row, to_column)
+                with some(also & written):
+                    rounds(builder, apart, also & written, work)
         return context.get_dummy_value()
 
     return types.void(*arguments), generate

@@ -48,8 +48,7 @@ MATCHING = (
     "matching_rows.fuse_maps",
 )
 RENDERING = (
-    "view_depth.splat",
-    "view_depth.vote",
+    "view_depth.move_and_vote",
     "view_depth.restore_thin",
     "view_depth.fill_background",
     "view_colour.blend",

@@ -24,6 +24,9 @@ UNKNOWN = np.float32(depth_runs.UNKNOWN)
 MARGIN = COUNT
 """Columns beside a moved map, which runs of pixels may read and write."""
 
+STEP = 8
+"""Rows of a view that are put to the vote at a time."""
+
 FEWEST_ALIKE = 2
 """Pixels of a line have as many neighbours on it."""
 
@@ -47,15 +50,23 @@ def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out
     height, width = disparity.shape
     if out.shape != (height + 2, width + 2 * MARGIN):
         raise ValueError("a view without its border")
-    by_x, by_y, spill = np.float32(shift_x), np.float32(shift_y), np.float32(1) - np.float32(reach)
     flat = out.ravel()
     flat[:] = UNKNOWN
+    rows = np.int32(0), np.int32(height + 1), np.int32(-1)
+    _move_rows(disparity, (np.float32(shift_x), np.float32(shift_y)), reach, flat, 0, rows, 0, height)
+
+
+@njit(cache=True, nogil=True)
+def _move_rows(disparity, shift, reach, flat, start, rows, first, last):  # type: ignore[no-untyped-def]
+    """Move rows first..last-1 of a map; `flat`, `start` and `rows` as in `move_run`."""
+    height, width = disparity.shape
+    spill = np.float32(1) - np.float32(reach)
     row = np.full(width + COUNT, np.nan, np.float32)
-    size = np.int32(width), np.int32(height)
-    for y in range(height):
+    for y in range(first, last):
         row[:width] = disparity[y]
         for x in range(0, width, COUNT):
-            move_run(row, flat, np.int32(x), np.int32(y), size[0], size[1], by_x, by_y, spill)
+            at, size = (np.int32(x), np.int32(y)), (np.int32(width), np.int32(height))
+            move_run(row, flat, start, at[0], at[1], size[0], size[1], shift[0], shift[1], spill, rows)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -143,6 +154,7 @@ def _outvote(  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def vote(
     moved: NDArray[np.float32],
+    wrap: int,
     cameras: NDArray[np.int64],
     maps: NDArray[np.float32],
     lumas: NDArray[np.int16],
@@ -165,13 +177,14 @@ def vote(
     there. So a wrong near disparity is outvoted, while one that is hidden from the others holds.
 
     Args:
-        moved: float32 (N, H + 2, W + 2 MARGIN), C-contiguous, px, or UNKNOWN; see `splat`.
+        moved: float32 (N, rows, W + 2 MARGIN), C-contiguous, px, or UNKNOWN: rows of what `splat` makes.
+        wrap: the bits of a row's number, counted with the border, that say which row of `moved` it is.
         cameras: int64 (N,), which of the R real cameras were moved.
         maps: float32 (R, H, W), px, of every real camera.
         lumas: int16 (R, H + 4, W + 4, 2), see `view_planes.split_luma`; of any size where denial is 0.
         shifts: float32 (N, 2), px (x, y) from the view to the camera for each px of disparity.
         weights: float32 (N,), of the cameras, above 0.
-        out: float32 (H, W), rows first..last-1 overwritten; UNKNOWN where no camera knows.
+        out: float32 (last - first, W), overwritten; UNKNOWN where no camera knows.
     """
     count, width = moved.shape[0], out.shape[1]
     near = np.empty(count, np.float32)
@@ -182,14 +195,14 @@ def vote(
     step, stride = moved.shape[1] * moved.shape[2], moved.shape[2]
     chosen = np.empty(width, np.int32)
     for y in range(first, last):
-        apart = 0
+        apart, row = 0, (y + 1) & wrap
         for x in range(0, width, COUNT):
-            found = vote_run(flat, weights, mean, (y + 1) * stride + MARGIN + x, step, x, near_px)
+            found = vote_run(flat, weights, mean, row * stride + MARGIN + x, step, x, near_px)
             apart = list_bits(found, x, chosen, apart)
         for x in chosen[:apart]:
             known = 0
             for i in range(count):
-                d = moved[i, y + 1, x + MARGIN]
+                d = moved[i, row, x + MARGIN]
                 if d > UNKNOWN:
                     place = known
                     while place > 0 and near[place - 1] < d:
@@ -202,7 +215,79 @@ def vote(
             mean[x] = _outvote(
                 x, y, near, who, known, cameras, maps, lumas, shifts, weights, limits, least, share
             )
-        out[y] = mean[:width]
+        out[y - first] = mean[:width]
+
+
+@njit(cache=True, nogil=True)
+def move_and_vote(
+    cameras: NDArray[np.int64],
+    maps: NDArray[np.float32],
+    extents: NDArray[np.float32],
+    lumas: NDArray[np.int16],
+    shifts: NDArray[np.float32],
+    weights: NDArray[np.float32],
+    reach: float,
+    tolerance: float,
+    contrast: float,
+    ratio: float,
+    denial: float,
+    out: FloatMap,
+    first: int,
+    last: int,
+) -> None:
+    """Move the cameras' maps to a view (`splat`) and put them to the vote (`vote`), rows first..last-1.
+
+    Both go down the picture together: of the moved maps no more rows are kept than one row of a map can
+    reach, few enough for the caches.
+
+    Args:
+        extents: float32 (R, 2), px, at most the least and at least the greatest disparity of each map.
+        out: float32 (last - first, W), overwritten; UNKNOWN where no camera knows.
+    """
+    count, (height, width) = cameras.size, maps.shape[1:]
+    before, beyond, tallest = np.empty(count, np.int64), np.empty(count, np.int64), 0
+    for i in range(count):
+        ends = shifts[i, 1] * extents[cameras[i], 0], shifts[i, 1] * extents[cameras[i], 1]
+        # Rows y + before..y + beyond of the map may cover row y of the view: rounded, and a row more.
+        before[i] = np.int64(np.floor(min(max(min(ends[0], ends[1]), -height), height))) - 2
+        beyond[i] = np.int64(np.ceil(min(max(max(ends[0], ends[1]), -height), height))) + 2
+        tallest = max(tallest, beyond[i] - before[i])
+    room = 1
+    while room < min(tallest + 2 + STEP, last - first):
+        room *= 2
+    stride = width + 2 * MARGIN
+    moved = np.full((count, room, stride), UNKNOWN, np.float32)
+    flat = moved.ravel()
+    rows = np.int32(first + 1), np.int32(last), np.int32(room - 1)
+    done = np.empty(count, np.int64)
+    for i in range(count):
+        done[i] = min(max(first + before[i], 0), height)
+    for y in range(first, last, STEP):
+        end = min(y + STEP, last)
+        for i in range(count):
+            until = min(max(end + beyond[i], done[i]), height)
+            shift = shifts[i, 0], shifts[i, 1]
+            _move_rows(maps[cameras[i]], shift, reach, flat, i * room * stride, rows, done[i], until)
+            done[i] = until
+        vote(
+            moved,
+            room - 1,
+            cameras,
+            maps,
+            lumas,
+            shifts,
+            weights,
+            tolerance,
+            contrast,
+            ratio,
+            denial,
+            out[y - first : end - first],
+            y,
+            end,
+        )
+        for i in range(count):
+            for row in range(y + 1, end + 1):
+                moved[i, row & (room - 1)] = UNKNOWN
 
 
 @njit(cache=True, nogil=True)

@@ -133,3 +133,17 @@ def mark_contours(disparity: FloatMap, tolerance: float, fetchable: FloatMap) ->
             two = max(high_two[x], high_two[x + 1]) - min(low_two[x], low_two[x + 1])
             out[x] = CONTOUR if (four > twice) | (two > near) else here[x]
     _repeat_edges(fetchable)
+
+
+@njit(cache=True, nogil=True)
+def extent(disparity: FloatMap) -> tuple[float, float]:
+    """The least and the greatest number of a map, float32 (H, W); (0, 0) where there is none."""
+    height, width = disparity.shape
+    least, most = np.full(width, np.inf, np.float32), np.full(width, -np.inf, np.float32)
+    for y in range(height):
+        for x in range(width):  # by column, which is vectorised; NaN is neither less nor more
+            d = disparity[y, x]
+            least[x] = d if d < least[x] else least[x]
+            most[x] = d if d > most[x] else most[x]
+    low, high = least.min(), most.max()
+    return (low, high) if low <= high else (np.float32(0), np.float32(0))

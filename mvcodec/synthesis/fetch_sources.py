@@ -6,6 +6,8 @@ import threading
 from collections.abc import Sequence
 from functools import partial
 
+import numpy as np
+
 from mvcodec.array import Position
 from mvcodec.frames import DecodedSet
 from mvcodec.synthesis.camera_spread import measure_spread
@@ -15,7 +17,8 @@ from mvcodec.workers import run_all
 class Sources:
     """The real cameras of one decoded set, prepared for fetching when a view first needs them.
 
-    `planes` are those of `kernels.view_planes`, indexed by place in `array.real`.
+    `planes` are those of `kernels.view_planes`, indexed by place in `array.real`, as is `extents`, float32
+    (R, 2): the least and the greatest disparity of each map, px.
     """
 
     def __init__(self, decoded: DecodedSet, spread: float | None) -> None:
@@ -25,6 +28,7 @@ class Sources:
         self.decoded = decoded
         self.spread = measure_spread(decoded) if spread is None else spread
         self.planes = make_room(len(array.real), array.height, array.width)
+        self.extents = np.empty((len(array.real), 2), np.float32)
         self._ready: set[Position] = set()
         self._lock = threading.Lock()
 
@@ -36,11 +40,11 @@ class Sources:
             self._ready.update(missing)
 
     def _prepare(self, camera: Position, tolerance_px: float) -> None:
-        from mvcodec.kernels.view_planes import mark_contours, split_luma
+        from mvcodec.kernels.view_planes import extent, mark_contours, split_luma
 
         place = self.decoded.array.real.index(camera)
         lumas, colours, disparities, fetchable = self.planes
         split_luma(self.decoded.pictures[camera], lumas[place], colours[place])
         values = self.decoded.disparities[camera].values_px
-        disparities[place] = values
+        disparities[place], self.extents[place] = values, extent(values)
         mark_contours(values, tolerance_px, fetchable[place])

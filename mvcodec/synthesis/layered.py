@@ -110,6 +110,7 @@ class Layered:
             sources, cameras = self._prepared(decoded, viewpoint)
             disparity = view_disparity(
                 sources.planes[2],
+                sources.extents,
                 sources.planes[0],
                 cameras,
                 self._ballot,

@@ -16,7 +16,7 @@ from mvcodec.array import Position, Viewpoint
 from mvcodec.frames import DecodedSet, RenderedView
 from mvcodec.synthesis.camera_spread import FALLBACK
 from mvcodec.synthesis.cell_cameras import CellCameras, find_cameras, real_view
-from mvcodec.synthesis.view_disparity import Ballot, view_disparity
+from mvcodec.synthesis.view_disparity import Ballot, disparity_rows
 from mvcodec.workers import check_threads, run_all, run_in_bands, threads
 
 TOLERANCE_PX = 1.5
@@ -43,6 +43,7 @@ class Quick:
         self._packed = np.empty((0, 0, 0), np.uint32)
         self._own = np.empty((0, 0, 0), np.float32)
         self._maps = np.empty((0, 0, 0), np.float32)
+        self._extents = np.empty((0, 2), np.float32)
 
     def render(self, decoded: DecodedSet, viewpoint: Viewpoint) -> RenderedView:
         """See `Synthesizer.render`. `seen_by` counts the cameras that agree on the pixel's surface."""
@@ -63,27 +64,36 @@ class Quick:
         from mvcodec.kernels.view_quick import WEIGHTS
 
         background_px = decoded.disparity_range_px[0]
-        disparity = view_disparity(self._maps, NO_LUMA, cameras, BALLOT, background_px)
+        weights = _whole(cameras.weights, WEIGHTS)
+        disparity = np.empty(self._maps.shape[1:], np.float32)
         pixels = np.empty((*disparity.shape, 3), np.uint8)
         seen_by = np.empty(disparity.shape, np.uint8)
-        run_in_bands(
-            disparity.shape[0],
-            kernel("view_quick.blend"),
-            cameras.places,
-            self._packed,
-            self._own,
-            cameras.shifts,
-            _whole(cameras.weights, WEIGHTS),
-            disparity,
-            TOLERANCE_PX,
-            pixels,
-            seen_by,
-        )
+
+        def make(first: int, last: int) -> None:
+            disparity[first:last] = disparity_rows(
+                self._maps, self._extents, NO_LUMA, cameras, BALLOT, background_px, first, last
+            )
+            kernel("view_quick.blend")(
+                cameras.places,
+                self._packed,
+                self._own,
+                cameras.shifts,
+                weights,
+                disparity,
+                TOLERANCE_PX,
+                pixels,
+                seen_by,
+                first,
+                last,
+            )
+
+        run_in_bands(disparity.shape[0], make)
         painting = pixels, disparity, seen_by, TOLERANCE_PX, HOLE_REACH_PX
         run_in_bands(disparity.shape[0], kernel("view_holes.paint_holes"), *painting)
         return RenderedView(viewpoint, pixels, disparity, seen_by)
 
     def _prepared(self, decoded: DecodedSet, viewpoint: Viewpoint) -> CellCameras:
+        from mvcodec.kernels.view_planes import extent
         from mvcodec.kernels.view_quick import pack
 
         if decoded is not self._decoded:
@@ -99,6 +109,7 @@ class Quick:
 
         def ready(camera: Position, place: int) -> None:
             self._maps[place] = decoded.disparities[camera].values_px
+            self._extents[place] = extent(self._maps[place])
             pack(decoded.pictures[camera], self._maps[place], self._packed[place], self._own[place])
 
         if missing:
@@ -113,6 +124,7 @@ class Quick:
         count = len(array.real)
         if self._maps.shape != (count, array.height, array.width):
             self._maps = np.empty((count, array.height, array.width), np.float32)
+            self._extents = np.empty((count, 2), np.float32)
             wider = count, array.height + 1, array.width + 1
             self._packed, self._own = (
                 reserve(wider, np.dtype(np.uint32)),

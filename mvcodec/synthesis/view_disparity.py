@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mvcodec.frames import FloatMap
 from mvcodec.synthesis.cell_cameras import CellCameras
-from mvcodec.workers import run_all, run_in_bands
+from mvcodec.workers import run_in_bands
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,62 +27,81 @@ class Ballot:
 
 def view_disparity(
     maps: NDArray[np.float32],
+    extents: NDArray[np.float32],
     lumas: NDArray[np.int16],
     seen: CellCameras,
     ballot: Ballot,
     background_px: float,
 ) -> FloatMap:
-    """Disparity of every pixel of a view.
-
-    Args:
-        maps: float32 (R, H, W), px, of every real camera.
-        lumas: int16 (R, H + 4, W + 4, 2), see `mvcodec.kernels.view_planes`; not looked at where nothing may
-            be denied.
-        background_px: disparity of rows of which no camera knows anything.
+    """Disparity of every pixel of a view; arguments as in `disparity_rows`.
 
     Returns:
         float32 (H, W), px, known everywhere.
     """
     from mvcodec.kernels.table import kernel
-    from mvcodec.kernels.view_depth import MARGIN
 
-    _, height, width = maps.shape
-    moved = np.empty((len(seen.places), height + 2, width + 2 * MARGIN), np.float32)
+    height = maps.shape[1]
+    found = np.empty(maps.shape[1:], np.float32)
+    smooth = np.empty_like(found) if ballot.speck_area_px > 1 else found
 
-    def move(place: int, shift: NDArray[np.float32], out: FloatMap) -> None:
-        kernel("view_depth.splat")(maps[place], shift[0], shift[1], ballot.reach_px, out)
+    def make(first: int, last: int) -> None:
+        rows = disparity_rows(maps, extents, lumas, seen, ballot, background_px, first, last)
+        found[first:last] = rows
+        if smooth is not found:
+            smooth[first:last] = rows
 
-    run_all(move, seen.places, seen.shifts, moved)
-    voted = np.empty((height, width), np.float32)
-    run_in_bands(
-        height,
-        kernel("view_depth.vote"),
-        moved,
+    run_in_bands(height, make)
+    if smooth is not found:
+        pieces = found, ballot.tolerance_px, 1, ballot.speck_area_px, smooth
+        run_in_bands(height, kernel("specks.smooth_over"), *pieces)
+    return smooth
+
+
+def disparity_rows(
+    maps: NDArray[np.float32],
+    extents: NDArray[np.float32],
+    lumas: NDArray[np.int16],
+    seen: CellCameras,
+    ballot: Ballot,
+    background_px: float,
+    first: int,
+    last: int,
+) -> FloatMap:
+    """Disparity of rows first..last-1 of a view, specks not yet looked for.
+
+    Args:
+        maps: float32 (R, H, W), px, of every real camera.
+        extents: float32 (R, 2), px, the least and the greatest disparity of each map.
+        lumas: int16 (R, H + 4, W + 4, 2), see `mvcodec.kernels.view_planes`; not looked at where nothing may
+            be denied.
+        background_px: disparity of rows of which no camera knows anything.
+
+    Returns:
+        float32 (last - first, W), px, known everywhere.
+    """
+    from mvcodec.kernels.table import kernel
+
+    above, below = max(first - 1, 0), min(last + 1, maps.shape[1])  # the median asks one row beyond these
+    voted = np.empty((below - above, maps.shape[2]), np.float32)
+    kernel("view_depth.move_and_vote")(
         seen.places,
         maps,
+        extents,
         lumas,
         seen.shifts,
         seen.weights,
+        ballot.reach_px,
         ballot.tolerance_px,
         ballot.contrast,
         ballot.ratio,
         ballot.denial,
         voted,
+        above,
+        below,
     )
-    cleaned = np.empty((height, width), np.float32)
-    smooth = np.empty((height, width), np.float32) if ballot.speck_area_px > 1 else cleaned
-
-    def clean(first: int, last: int) -> None:
-        above, below = max(first - 1, 0), min(last + 1, height)  # the median asks one row beyond the band
-        cleaned[first:last] = cv2.medianBlur(voted[above:below], 3)[first - above : last - above]
-        kernel("view_depth.restore_thin")(voted, ballot.tolerance_px, cleaned, first, last)
-        kernel("view_depth.fill_background")(cleaned, background_px, first, last)
-        if smooth is not cleaned:
-            smooth[first:last] = cleaned[first:last]
-
-    run_in_bands(height, clean)
-    if smooth is cleaned:
-        return cleaned
-    pieces = cleaned, ballot.tolerance_px, 1, ballot.speck_area_px, smooth
-    run_in_bands(height, kernel("specks.smooth_over"), *pieces)
-    return smooth
+    cleaned = cv2.medianBlur(voted, 3)
+    band = first - above, last - above
+    kernel("view_depth.restore_thin")(voted, ballot.tolerance_px, cleaned, *band)
+    kernel("view_depth.fill_background")(cleaned, background_px, *band)
+    rows: FloatMap = cleaned[slice(*band)]
+    return rows
