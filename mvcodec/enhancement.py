@@ -10,7 +10,14 @@ from typing import Any
 from mvcodec.array import Position
 from mvcodec.errors import StreamError
 from mvcodec.fields import Fields
-from mvcodec.stream import PREDICTOR, REFERENCE_CODEC, StreamHeader, Track, TrackKind
+from mvcodec.stream import (
+    PREDICTOR,
+    REFERENCE_CODECS,
+    StreamHeader,
+    Track,
+    TrackKind,
+    second_reference_of,
+)
 
 LAYER_VERSION = 1
 LAYER_TRACK = Track(TrackKind.LAYER)
@@ -40,10 +47,12 @@ class EnhancementHeader:
     Attributes:
         views: in the order of decoding.
         settings: the encoder's, for the record.
+        second_reference: one of REFERENCE_CODECS.
     """
 
     views: tuple[EnhancedView, ...]
     settings: Mapping[str, Any] = field(default_factory=dict)
+    second_reference: str = "none"
 
     def to_json(self) -> bytes:
         """UTF-8 JSON as FORMAT.md specifies it."""
@@ -52,7 +61,7 @@ class EnhancementHeader:
             "format": "mvcodec-enhancement",
             "version": LAYER_VERSION,
             "predictor": PREDICTOR,
-            "codec": REFERENCE_CODEC,
+            "codec": REFERENCE_CODECS[self.second_reference],
             "views": views,
             "settings": dict(self.settings),
         }
@@ -75,8 +84,8 @@ class EnhancementHeader:
                 fields.text("format"),
                 fields.get("version", "1"),
                 fields.text("predictor"),
-                fields.text("codec"),
             )
+            codec = fields.text("codec")
             views = tuple(
                 EnhancedView(_position(each["view"]), tuple(map(_position, each["from"])))
                 for each in document["views"]
@@ -87,10 +96,12 @@ class EnhancementHeader:
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             found_text = f"a damaged enhancement header ({error})"
             raise StreamError(source, found_text, "the fields of FORMAT.md") from None
-        expected = ("mvcodec-enhancement", LAYER_VERSION, PREDICTOR, REFERENCE_CODEC)
-        if said != expected:
-            raise StreamError(source, f"an enhancement layer of {said}", f"{expected}")
-        found = cls(views, settings)
+        expected = ("mvcodec-enhancement", LAYER_VERSION, PREDICTOR)
+        second = second_reference_of(codec)
+        if said != expected or second is None:
+            known = " or ".join(REFERENCE_CODECS.values())
+            raise StreamError(source, f"an enhancement layer of {(*said, codec)}", f"{(*expected, known)}")
+        found = cls(views, settings, second)
         found._check(header, source)
         return found
 

@@ -74,8 +74,9 @@ PREDICTIONS = ("none", "synthesis")
 PREDICTOR = "warp-1"
 """The one way of predicting pictures that there is; another one gets another name."""
 
-REFERENCE_CODEC = "vp9"
-"""The one codec of predicted pictures that there is."""
+REFERENCE_CODECS = {"none": "vp9", "nearest": "vp9+nearest"}
+"""Names of how predicted pictures are coded, by the second picture that each may build on beside its own past
+and its prediction: none, or the nearest of its references as it was decoded."""
 
 _CALIBRATION = ("fx_px", "fy_px", "cx_px", "cy_px", "baseline_m", "d_inf_px_per_step")
 
@@ -125,6 +126,7 @@ class StreamHeader:
         disparity_cameras: one of DISPARITY_CAMERAS.
         predicted: the real cameras that are predicted from others, in the order of decoding.
         disparity_use: one of DISPARITY_USES.
+        second_reference: one of REFERENCE_CODECS, of the predicted cameras.
     """
 
     array: CameraArray
@@ -136,6 +138,7 @@ class StreamHeader:
     disparity_cameras: str = "all"
     predicted: tuple[PredictedCamera, ...] = ()
     disparity_use: str = "all"
+    second_reference: str = "none"
 
     def __post_init__(self) -> None:
         low, high = self.disparity_range_px
@@ -247,7 +250,8 @@ class StreamHeader:
             document["disparity_use"] = self.disparity_use
         if self.predicted:
             cameras = [{"camera": each.camera, "from": each.references} for each in self.predicted]
-            document["prediction"] = {"predictor": PREDICTOR, "codec": REFERENCE_CODEC, "cameras": cameras}
+            codec = REFERENCE_CODECS[self.second_reference]
+            document["prediction"] = {"predictor": PREDICTOR, "codec": codec, "cameras": cameras}
         return json.dumps(document, separators=(",", ":")).encode()
 
     @classmethod
@@ -280,6 +284,7 @@ class StreamHeader:
 
     @classmethod
     def _from_fields(cls, fields: Fields) -> StreamHeader:
+        predicted = fields.inner("prediction") if "prediction" in fields else None
         return cls(
             array=_array(fields.inner("array")),
             disparity_range_px=fields.pair("disparity_range_px"),
@@ -288,16 +293,16 @@ class StreamHeader:
             settings=fields.inner("settings").values,
             disparity_scale=fields.integer("disparity_scale", 1, DISPARITY_SCALES[-1], 1),
             disparity_cameras=fields.text("disparity_cameras", "all"),
-            predicted=_predicted(fields.inner("prediction")) if "prediction" in fields else (),
+            predicted=() if predicted is None else _predicted(predicted),
+            second_reference="none" if predicted is None else _second_reference(predicted),
             disparity_use=fields.text("disparity_use", "all"),
         )
 
 
 def _predicted(fields: Fields) -> tuple[PredictedCamera, ...]:
     """The header's `prediction`."""
-    for name, known in (("predictor", PREDICTOR), ("codec", REFERENCE_CODEC)):
-        if fields.text(name) != known:
-            raise fields.wrong(name, fields.text(name), known)
+    if fields.text("predictor") != PREDICTOR:
+        raise fields.wrong("predictor", fields.text("predictor"), PREDICTOR)
     cameras = fields.get("cameras", "a list")
     try:
         return tuple(
@@ -307,6 +312,20 @@ def _predicted(fields: Fields) -> tuple[PredictedCamera, ...]:
     except (TypeError, KeyError, ValueError):
         expected = '[{"camera": [row, col], "from": [[row, col], ...]}, ...]'
         raise fields.wrong("cameras", cameras, expected) from None
+
+
+def _second_reference(fields: Fields) -> str:
+    """What the codec of the header's `prediction` says."""
+    codec = fields.text("codec")
+    found = second_reference_of(codec)
+    if found is None:
+        raise fields.wrong("codec", codec, " or ".join(REFERENCE_CODECS.values()))
+    return found
+
+
+def second_reference_of(codec: str) -> str | None:
+    """Which of REFERENCE_CODECS a name stands for, if one."""
+    return next((name for name, known in REFERENCE_CODECS.items() if known == codec), None)
 
 
 def _position(value: Any) -> Position:

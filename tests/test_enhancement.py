@@ -145,9 +145,22 @@ def test_some_views_can_be_asked_for() -> None:
         EncoderConfig(enhance_views=((1, 1),))
 
 
-def test_the_layer_stands_on_predicted_cameras_too() -> None:
-    found = decoded(written(encode(2, prediction="synthesis")))
+@pytest.mark.parametrize("second", ["none", "nearest"])
+def test_the_layer_stands_on_predicted_cameras_too(second: str) -> None:
+    found = decoded(written(encode(2, prediction="synthesis", second_reference=second)))
     assert all(sorted(each.enhanced) == VIRTUAL for each in found)
+
+
+def test_a_layer_may_have_a_second_reference_that_its_base_has_not(coded: list[list[Packet]]) -> None:
+    sets = encode(4, second_reference="nearest")
+    assert sets[0][0] == coded[0][0]
+    header = StreamHeader.from_json(sets[0][0].data)
+    layer = EnhancementHeader.from_json(sets[0][1].data, header, "x")
+    assert (header.second_reference, layer.second_reference) == ("none", "nearest")
+    assert all(sorted(each.enhanced) == VIRTUAL for each in decoded(written(sets)))
+    other = json.loads(sets[0][1].data) | {"codec": "vp9+else"}
+    with pytest.raises(StreamError, match=r"vp9\+else'\), expected .*vp9 or vp9\+nearest"):
+        EnhancementHeader.from_json(json.dumps(other).encode(), header, "x")
 
 
 def test_a_missing_or_damaged_unit_is_told_once_and_healed_by_the_next_keyframe(

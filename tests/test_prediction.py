@@ -42,10 +42,12 @@ def decoded_sets(file: bytes, frames: slice | None = None) -> list[DecodedSet]:
 
 
 @pytest.mark.parametrize("shape", [(1, 2), (2, 1), (2, 2), (3, 3)])
-@pytest.mark.parametrize("maps", ["all", "alternate"])
-def test_every_camera_comes_back(shape: tuple[int, int], maps: str) -> None:
+@pytest.mark.parametrize(
+    ("maps", "second"), [("all", "none"), ("alternate", "none"), ("alternate", "nearest")]
+)
+def test_every_camera_comes_back(shape: tuple[int, int], maps: str, second: str) -> None:
     array = make_array(rows=shape[0], cols=shape[1])
-    found = decoded_sets(predicted_file(array, disparity_cameras=maps, qp=24))
+    found = decoded_sets(predicted_file(array, disparity_cameras=maps, second_reference=second, qp=24))
     assert [decoded.index for decoded in found] == [0, 1, 2]
     for decoded in found:
         for camera in array.real:
@@ -110,7 +112,7 @@ def test_the_header_says_who_depends_on_whom() -> None:
     ("change", "message"),
     [
         ({"predictor": "warp-9"}, "prediction.predictor = warp-9, expected warp-1"),
-        ({"codec": "h264"}, "prediction.codec = h264, expected vp9"),
+        ({"codec": "h264"}, "prediction.codec = h264, expected vp9 or vp9+nearest"),
         ({"cameras": [{"camera": [1, 1], "from": []}]}, "real cameras that are decoded before"),
         (
             {"cameras": [{"camera": [0, 1], "from": [[0, 1]]}]},
@@ -135,8 +137,24 @@ def test_version_1_does_not_say_it() -> None:
         StreamHeader.from_json(json.dumps(document).encode())
 
 
-def test_random_access_and_late_join_give_the_same_pictures() -> None:
-    file = predicted_file(frames=7, gop=3)
+def test_where_maps_are_wrong_the_nearest_camera_itself_saves_bits() -> None:
+    """The matcher's ramps are not where things are, but the cameras see the same photograph."""
+    plain, nearest = (
+        encode(make_array(), 1, **FORM, second_reference=second)[0] for second in ("none", "nearest")
+    )
+    assert json.loads(nearest[0].data)["prediction"]["codec"] == "vp9+nearest"
+    header = StreamHeader.from_json(nearest[0].data)
+    assert (header.second_reference, header.to_json()) == ("nearest", nearest[0].data)
+    before, now = (
+        sum(len(packet.data) for packet in packets if packet.track.kind is TrackKind.PREDICTED)
+        for packets in (plain, nearest)
+    )
+    assert now < 0.7 * before
+
+
+@pytest.mark.parametrize("second", ["none", "nearest"])
+def test_random_access_and_late_join_give_the_same_pictures(second: str) -> None:
+    file = predicted_file(frames=7, gop=3, second_reference=second)
     whole, late = decoded_sets(file), decoded_sets(file, slice(4, 6))
     for one, other in zip(whole[4:6], late, strict=True):
         for camera in one.pictures:
@@ -181,9 +199,10 @@ def test_another_prediction_is_told_and_never_shown() -> None:
     assert found.absent == ((1, 1),)
 
 
-def test_such_files_are_clean_and_what_remains_of_damaged_ones_too(tmp_path: Path) -> None:
+@pytest.mark.parametrize("second", ["none", "nearest"])
+def test_such_files_are_clean_and_what_remains_of_damaged_ones_too(second: str, tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
-    file = predicted_file(frames=6, gop=2)
+    file = predicted_file(frames=6, gop=2, second_reference=second)
     path.write_bytes(file)
     assert validate(path) == []
     new = tmp_path / "new.mcap"

@@ -102,6 +102,12 @@ def test_every_keyframe_is_a_place_to_begin(references: int) -> None:
         np.testing.assert_array_equal(one.v, other.v)
 
 
+def test_a_keyframe_for_another_number_of_predictions_is_refused() -> None:
+    unit = coded()[0]
+    with pytest.raises(StreamError, match="1 frames in front of a keyframe of 2 predictions"):
+        Vp9ReferenceDecoder((WIDTH, HEIGHT)).push(unit, predictions(0, 2), True, "x")
+
+
 def test_another_prediction_is_told_before_a_wrong_picture_comes_of_it() -> None:
     decoder = Vp9ReferenceDecoder((WIDTH, HEIGHT))
     with pytest.raises(MissingReference, match="x: found a prediction that is not the encoder's"):

@@ -101,6 +101,18 @@ CASES: dict[str, Case] = {
     "predicted_no_maps": Case(
         _calibrated(), (0, 1, 2), {"qp": 32, "gop": 2, "disparity_cameras": "none", "prediction": "synthesis"}
     ),
+    "enhanced_nearest": Case(
+        _calibrated(),
+        (0, 1, 2),
+        {
+            "qp": 36,
+            "gop": 2,
+            "prediction": "synthesis",
+            "enhance": 30,
+            "enhance_views": ((0, 1), (1, 1)),
+            "second_reference": "nearest",
+        },
+    ),
     "enhanced": Case(
         _calibrated(),
         (0, 1, 2),

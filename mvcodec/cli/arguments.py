@@ -32,8 +32,8 @@ AS_THEY_ARE = (
     "anchor_codecs anchors bits board board_input calibration chunk_ms clock cluster codec crf "
     "depth_topics disparity_cameras disparity_median disparity_qp disparity_scale enhance enhance_chain "
     "enhance_views format fps frames gaps gop grid host incomplete interpolation keyframe_ratio live_view "
-    "matcher nominal on_error path port prediction preset qp real retries rig scene seed size speed split "
-    "style sync synthesizer target_psnr threads tolerance_ms topics when_behind"
+    "matcher nominal on_error path port prediction preset qp real retries rig scene second_reference seed "
+    "size speed split style sync synthesizer target_psnr threads tolerance_ms topics when_behind"
 )
 OPTIONS = {name: f"--{name.replace('_', '-')}" for name in AS_THEY_ARE.split()} | OTHERWISE
 """The options behind the library's settings."""

@@ -42,6 +42,7 @@ CODING = (
     "disparity_scale",
     "disparity_cameras",
     "prediction",
+    "second_reference",
     "disparity_median",
     "gop",
     "keyframe_ratio",
@@ -71,7 +72,13 @@ def add_coding(parser: argparse.ArgumentParser) -> None:
     )
     add_setting(parser, EncoderConfig, "codec", parse=codec_name)
     add_setting(parser, EncoderConfig, "disparity_qp", metavar="N|auto")
-    for name in ("disparity_scale", "disparity_cameras", "prediction", "disparity_median"):
+    for name in (
+        "disparity_scale",
+        "disparity_cameras",
+        "prediction",
+        "second_reference",
+        "disparity_median",
+    ):
         add_setting(parser, EncoderConfig, name)
     add_setting(
         parser,

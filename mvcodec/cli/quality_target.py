@@ -86,6 +86,7 @@ def _record(source: ArraySource, config: EncoderConfig, psnr_y: float, codings: 
         "qp": config.rate.qp,
         "enhance": config.enhance,
         "disparity_scale": config.scale_for(source.array),
+        "second_reference": config.chosen_second_reference,
         "psnr_y": psnr_y,
         "codings": codings,
     }

@@ -120,6 +120,6 @@ class EnhancedViews:
         whole = there.issuperset(each.references) and maps <= waiting.planes.keys()
 
         def predictions() -> list[Planes]:
-            return [frame.predict(each.view, each.references)]
+            return frame.predict(each.view, each.references, self.layer.second_reference)
 
         return decoder.push(packet, label, predictions if whole else None)

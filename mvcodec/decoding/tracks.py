@@ -9,7 +9,7 @@ from functools import partial
 from mvcodec.array import Position
 from mvcodec.container.assembly import PacketSet
 from mvcodec.errors import MissingReference, SettingError, StreamError
-from mvcodec.stream import Packet, PredictedCamera, StreamHeader, Track, TrackKind
+from mvcodec.stream import Packet, StreamHeader, Track, TrackKind
 from mvcodec.synthesis.frame_prediction import FramePrediction
 from mvcodec.video.codec import Planes
 from mvcodec.video.codecs import find_codec
@@ -127,7 +127,8 @@ class Tracks:
             if packet is None:
                 continue
             whole = header.needed_tracks(each) <= planes.keys()
-            make = partial(_predictions, frame, each) if whole else None
+            second = header.second_reference
+            make = partial(frame.predict, each.camera, each.references, second) if whole else None
             try:
                 found = self._predicted[track].push(packet, label(packet), make)
             except MissingReference as error:
@@ -149,10 +150,6 @@ def _lose_after(before: Job[Planes | None] | None, decoder: TrackDecoder) -> Non
     if before is not None:
         settle([before])
     decoder.lost = True
-
-
-def _predictions(frame: FramePrediction, predicted: PredictedCamera) -> list[Planes]:
-    return [frame.predict(predicted.camera, predicted.references)]
 
 
 def _note(reasons: dict[Position, StreamError], track: Track, error: StreamError) -> None:

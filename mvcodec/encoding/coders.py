@@ -161,7 +161,15 @@ def enhancer(header: StreamHeader, config: EncoderConfig, views: Sequence[Positi
     assert quality is not None
     assert config.enhance is not None
     quantizer = predicted_quantizer(quality, find_codec(config.codec), LAYER_LINE)
-    return Enhancer(header, views, quantizer, config.chosen_preset, config.enhance, config.enhance_chain)
+    return Enhancer(
+        header,
+        views,
+        quantizer,
+        config.chosen_preset,
+        config.enhance,
+        config.enhance_chain,
+        config.chosen_second_reference,
+    )
 
 
 def _packet(track: Track, frames: FrameSet, picture: CodedPicture) -> Packet:

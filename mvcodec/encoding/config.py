@@ -11,7 +11,14 @@ from mvcodec.encoding.speed_choice import FOR_FILES, SPEEDS
 from mvcodec.errors import SettingError
 from mvcodec.settings import check_settings, setting
 from mvcodec.stereo.matcher import Matcher
-from mvcodec.stream import DISPARITY_CAMERAS, DISPARITY_SCALES, PREDICTIONS, StreamHeader, map_cameras
+from mvcodec.stream import (
+    DISPARITY_CAMERAS,
+    DISPARITY_SCALES,
+    PREDICTIONS,
+    REFERENCE_CODECS,
+    StreamHeader,
+    map_cameras,
+)
 from mvcodec.video.codec import PRESETS, RateControl, check_qp
 from mvcodec.video.codecs import CODECS, find_codec
 from mvcodec.video.disparity_rate import (
@@ -142,6 +149,13 @@ class EncoderConfig:
         " and cost bits (default: any number)",
         low=0,
     )
+    second_reference: str | None = setting(
+        None,
+        "nearest: pictures that are predicted, cameras' and the layer's, may also build on the nearest"
+        " decoded one as it is, which saves bits where maps are bad; older readers refuse such files"
+        " (default: none; beside `prediction`, `enhance` auto and a quality or bit rate: what is cheapest)",
+        choices=tuple(REFERENCE_CODECS),
+    )
     disparity_median: int | None = setting(
         None,
         "smooth maps over N x N before coding (default: 5, at half size 3)",
@@ -197,6 +211,11 @@ class EncoderConfig:
     def chosen_preset(self) -> str:
         """The preset given, or the speed's."""
         return self.preset or SPEEDS[self.speed].preset
+
+    @property
+    def chosen_second_reference(self) -> str:
+        """The second reference given, or none."""
+        return self.second_reference or "none"
 
     @property
     def quality(self) -> float | None:

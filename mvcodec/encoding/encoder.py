@@ -223,7 +223,16 @@ class Encoder:
         maps = None if cameras == "none" else self.config.rate_of_maps(self.array, span)
         settings, use = self._settings_record(maps), self.config.use_for(self.array)
         return StreamHeader(
-            self.array, span, codec, frames.index, settings, self._scale, cameras, self._order, use
+            self.array,
+            span,
+            codec,
+            frames.index,
+            settings,
+            self._scale,
+            cameras,
+            self._order,
+            use,
+            self.config.chosen_second_reference if self._order else "none",
         )
 
     def _settings_record(self, maps: RateControl | None) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 
 from mvcodec.array import CameraArray, Position
-from mvcodec.encoding.predicted_cameras import SPEEDS
+from mvcodec.encoding.predicted_cameras import SPEEDS, reference_count
 from mvcodec.enhancement import LAYER_TRACK, EnhancedView, EnhancementHeader
 from mvcodec.errors import SettingError
 from mvcodec.frames import Picture
@@ -119,6 +119,7 @@ class Enhancer:
         preset: effort, one of PRESETS.
         asked: what the quantizer was chosen for, for the record.
         most: as in `layer_order`.
+        second_reference: one of REFERENCE_CODECS.
 
     Raises:
         LibvpxMissing: there is no libvpx.
@@ -132,13 +133,15 @@ class Enhancer:
         preset: str,
         asked: float | str,
         most: int | None = None,
+        second_reference: str = "none",
     ) -> None:
         size = even_size(header.array.width, header.array.height)
         self._order = layer_order(header.array, views, most)
-        self.header = EnhancementHeader(self._order, {"enhance": asked, "speed": SPEEDS[preset]})
+        speed, references = SPEEDS[preset], reference_count(second_reference)
+        self.header = EnhancementHeader(self._order, {"enhance": asked, "speed": speed}, second_reference)
         self._base_header, self._base = header, StreamTracks(header)
         self._encoders = {
-            view: Vp9ReferenceEncoder(ReferenceSettings(*size, each, speed=SPEEDS[preset]))
+            view: Vp9ReferenceEncoder(ReferenceSettings(*size, each, references, speed))
             for view, each in view_quantizers(self.header, quantizer).items()
         }
         sources = {other for each in self._order for other in each.references}
@@ -173,7 +176,8 @@ class Enhancer:
         while waiting:
             # Views whose references are there are coded side by side.
             ready = [each for each in waiting if not {w.view for w in waiting} & set(each.references)]
-            predictions = [[frame.predict(each.view, each.references)] for each in ready]
+            second = self.header.second_reference
+            predictions = [frame.predict(each.view, each.references, second) for each in ready]
             originals = [to_planes(pictures[each.view]) for each in ready]
             units = run_all(
                 self._code, [each.view for each in ready], originals, predictions, [keyframe] * len(ready)

@@ -60,6 +60,11 @@ def predicted_quantizer(quality: float, codec: Codec, line: tuple[float, float])
     return min(max(line[0] * of_x264 + line[1], 1.0), float(MAX_QUANTIZER))
 
 
+def reference_count(second_reference: str) -> int:
+    """How many predictions each picture has; `second_reference` is one of REFERENCE_CODECS."""
+    return 1 if second_reference == "none" else 2
+
+
 class PredictedCameras:
     """Codes the predicted cameras of a stream. What they are predicted from is decoded here, as decoders do.
 
@@ -75,7 +80,8 @@ class PredictedCameras:
 
     def __init__(self, header: StreamHeader, codec: Codec, quantizer: int, preset: str) -> None:
         size = even_size(header.array.width, header.array.height)
-        settings = ReferenceSettings(*size, quantizer, speed=SPEEDS[preset])
+        references = reference_count(header.second_reference)
+        settings = ReferenceSettings(*size, quantizer, references, SPEEDS[preset])
         tracks = [header.picture_track(each.camera) for each in header.predicted]
         self._header = header
         self._needed = {track for each in header.predicted for track in header.needed_tracks(each)}
@@ -98,7 +104,8 @@ class PredictedCameras:
         found: dict[Track, CodedPicture] = {}
         for each in self._header.predicted:
             track = self._header.picture_track(each.camera)
-            predictions = [frame.predict(each.camera, each.references)]
+            second = self._header.second_reference
+            predictions = frame.predict(each.camera, each.references, second)
             data = self._encoders[track].push(pictures[each.camera], predictions, keyframe)
             found[track] = CodedPicture(data, keyframe)
             if track in self._needed:

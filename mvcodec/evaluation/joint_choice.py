@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from mvcodec.capture import ArraySource
 from mvcodec.encoding.config import AUTO, EncoderConfig
@@ -77,7 +78,9 @@ def choose_together(
     synthesizer: Synthesizer,
     on_coding: Callable[[], object] = lambda: None,
 ) -> Chosen:
-    """Choose the pictures' QP, the layer's, whether there is one, and the maps' scale where it is not given.
+    """Choose the pictures' QP, the layer's, whether there is one, and what is left open of how all is coded.
+
+    Left open may be the maps' scale and the second reference of what is predicted.
 
     Args:
         chosen: frame numbers of the input, consecutive.
@@ -130,7 +133,8 @@ def choose_for_rate(
             found = replace(config, enhance=None, enhance_views=None, enhance_chain=None)
         else:
             offset = (_layer_qp(best) - _base_qp(best)) / find_codec(config.codec).qp_line[0]
-            found = replace(config, enhance=f"{offset:+.1f}")
+            second = best.config.second_reference
+            found = replace(config, enhance=f"{offset:+.1f}", second_reference=second)
         return Chosen(found, best.psnr_y, best.bits, trials.count)
 
 
@@ -175,10 +179,20 @@ class _Search:
                 best, moved = moved, self._moved(moved, direction)
             if best is not start:
                 break
-        if self._config.disparity_scale is None and best.config.scale_for(self._array) == 1:
-            halved = self._brought(self._try(replace(best.config, disparity_scale=2)))
-            best = halved if self._pays(halved, best) else best
+        for change in self._changes(best):
+            changed = self._brought(self._try(replace(best.config, **change)))
+            best = changed if self._pays(changed, best) else best
         return self._alone(best) or best
+
+    def _changes(self, best: Trial) -> list[dict[str, Any]]:
+        """Settings that were left open, as they are tried beside the best base and layer, one by one."""
+        found: list[dict[str, Any]] = []
+        if self._config.disparity_scale is None and best.config.scale_for(self._array) == 1:
+            found.append({"disparity_scale": 2})
+        if self._config.second_reference is None and self._config.prediction != "none":
+            # Beside cameras that play alone the layer stays one that older readers know.
+            found.append({"second_reference": "nearest"})
+        return found
 
     def _about(self) -> Trial:
         """A base with the layer that the model has for it, not far from the target."""
@@ -283,6 +297,8 @@ class _Search:
                 qp = min(max(qp, _layer_qp(reached) + LEAST_STEP), _layer_qp(missed) - LEAST_STEP)
                 if qp < _layer_qp(reached) + LEAST_STEP:
                     break
+            elif missed is not None:
+                qp = min(qp, _layer_qp(missed) - LEAST_STEP)
             qp = self._layer_within(qp)
             trial = self._check(replace(probe.config, enhance=qp))
             gap = self._target + CLOSE / 2 - trial.psnr_y
@@ -311,7 +327,10 @@ class _Search:
     def _alone(self, best: Trial) -> Trial | None:
         """A base without a layer that reaches the target with fewer bits, if there is one."""
         finer = HALVING * self._codec.qp_line[0] * math.log2(best.bits / best.base_bits)
-        bare = replace(self._config, enhance=None, enhance_views=None, enhance_chain=None)
+        second = best.config.second_reference
+        bare = replace(
+            self._config, enhance=None, enhance_views=None, enhance_chain=None, second_reference=second
+        )
         start = _base_qp(best) - finer
         return self._coarsest(lambda qp: self._try(replace(bare, qp=qp)), start, best.bits)[0]
 

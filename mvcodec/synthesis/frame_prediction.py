@@ -45,10 +45,19 @@ class FramePrediction:
         """A picture that was decoded after others."""
         self._planes[place] = planes
 
-    def predict(self, place: Position, references: Sequence[Position]) -> Planes:
-        """The picture of a place, from those of references, which are decoded, as are the maps they need."""
+    def predict(
+        self, place: Position, references: Sequence[Position], second_reference: str = "none"
+    ) -> list[Planes]:
+        """What the picture of a place may build on, from references, which are decoded, as are their maps.
+
+        Args:
+            second_reference: one of REFERENCE_CODECS.
+        """
         sources = [self._source(other) for other in references]
-        return predict(self._header.array, sources, place, self.disparity(place))
+        found = [predict(self._header.array, sources, place, self.disparity(place))]
+        if second_reference == "nearest":
+            found.append(self._planes[_nearest(place, references)])
+        return found
 
     def _source(self, place: Position) -> PredictionSource:
         if place not in self._sources:
@@ -68,3 +77,8 @@ class FramePrediction:
                 maps = {camera: self.disparity(camera) for camera in around}
                 self._maps[place] = predicted_disparity(header.array, maps, place, span)
         return self._maps[place]
+
+
+def _nearest(place: Position, references: Sequence[Position]) -> Position:
+    """The reference that is the fewest steps away, by their squares; the first one of those."""
+    return min(references, key=lambda other: (other[0] - place[0]) ** 2 + (other[1] - place[1]) ** 2)

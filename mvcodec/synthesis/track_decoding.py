@@ -30,6 +30,7 @@ class StreamTracks:
         self._predicted = {header.picture_track(each.camera): each for each in header.predicted}
         self._alone = {track: codec.decoder() for track in header.tracks if track not in self._predicted}
         self._views = {} if layer is None else {each.track: each for each in layer.views}
+        self._layer_second = "none" if layer is None else layer.second_reference
         size = sizes[TrackKind.TEXTURE]
         self._others = {track: PredictedTrackDecoder(size) for track in (*self._predicted, *self._views)}
 
@@ -39,12 +40,12 @@ class StreamTracks:
         found = dict(zip(self._alone, run_all(self._decode, [by_track[t] for t in self._alone]), strict=True))
         frame = FramePrediction(self._header, found)
         for track, each in self._predicted.items():
-            make = partial(_one, frame, each.camera, each.references)
+            make = partial(frame.predict, each.camera, each.references, self._header.second_reference)
             found[track] = self._others[track].push(by_track[track], track.topic, make)
             frame.add(each.camera, found[track])
         frame = FramePrediction(self._header, found)
         for track, view in self._views.items():
-            make = partial(_one, frame, view.view, view.references)
+            make = partial(frame.predict, view.view, view.references, self._layer_second)
             found[track] = self._others[track].push(by_track[track], track.topic, make)
             frame.add(view.view, found[track])
         return {track: found[track] for track in (*self._header.tracks, *self._views)}
@@ -52,9 +53,3 @@ class StreamTracks:
     def _decode(self, packet: Packet) -> Planes:
         (planes,) = self._alone[packet.track].push(packet.data, packet.track.topic)
         return planes
-
-
-def _one(
-    frame: FramePrediction, place: tuple[int, int], references: Iterable[tuple[int, int]]
-) -> list[Planes]:
-    return [frame.predict(place, tuple(references))]

@@ -141,6 +141,10 @@ class Vp9ReferenceDecoder:
             unit = ReferenceUnit.parse(data)
             if bool(unit.start) != keyframe:
                 raise NalError(f"{len(unit.start)} frames in front of {'a' if keyframe else 'no'} keyframe")
+            if keyframe and len(unit.start) != len(predictions):
+                raise NalError(
+                    f"{len(unit.start)} frames in front of a keyframe of {len(predictions)} predictions"
+                )
             if not keyframe and self._decoder is None:
                 raise MissingReference(label, "a picture that builds on one that is missing", "a keyframe")
             if unit.checksum != checksum(predictions):
