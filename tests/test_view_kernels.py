@@ -80,28 +80,6 @@ def test_splat_closes_the_cracks_of_a_stretched_surface() -> None:
 # --- filling
 
 
-@settings(max_examples=40, deadline=None)
-@given(seeds, shapes, st.sampled_from([0.0, 0.3, 1.0]))
-def test_restore_thin(seed: int, shape: Shape, holes: float) -> None:
-    rng = np.random.default_rng(seed)
-    (voted,) = some_maps(rng, 1, shape, holes)
-    cleaned = twins.median3(voted)
-    expected = twins.restore_thin(voted, 0.5, cleaned)
-    in_bands(shape[0], cleaned, lambda *band: view_depth.restore_thin(voted, 0.5, cleaned, *band))
-    np.testing.assert_array_equal(cleaned, expected)
-
-
-def test_a_line_outlives_the_median_and_a_stray_pixel_does_not() -> None:
-    voted = np.zeros((9, 9), np.float32)
-    voted[:, 4] = 8
-    voted[4, 7] = 8
-    cleaned = twins.median3(voted)
-    assert (cleaned == 0).all()
-    view_depth.restore_thin(voted, 1.5, cleaned, 0, 9)
-    assert (cleaned[1:-1, 4] == 8).all()
-    assert (np.delete(cleaned, 4, axis=1) == 0).all()
-
-
 @settings(max_examples=60, deadline=None)
 @given(seeds, shapes, st.sampled_from([0.1, 0.5, 0.9, 1.0]))
 def test_fill_background(seed: int, shape: Shape, holes: float) -> None:

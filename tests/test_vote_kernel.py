@@ -8,10 +8,10 @@ import view_twins as twins
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from view_kernel_input import Shape, in_bands, in_pairs, seeds, shapes, smoother, some_maps
+from view_kernel_input import Shape, in_bands, in_pairs, seeds, shapes, some_maps
 
 from mvcodec.frames import FloatMap
-from mvcodec.kernels import view_depth, view_planes
+from mvcodec.kernels import view_depth
 
 LIMITS = twins.Limits(tolerance=1.5, contrast=10, ratio=1.3, denial=0.6)
 
@@ -21,11 +21,7 @@ def voted(maps: NDArray[np.float32], ballot: twins.Ballot, limits: twins.Limits)
     cameras, margin = np.arange(len(maps)), view_depth.MARGIN - 1
     padded = np.pad(maps, ((0, 0), (0, 0), (margin, margin)), constant_values=77)
     who = cameras, ballot.maps, in_pairs(ballot.lumas), ballot.shifts, ballot.weights
-
-    def vote(first: int, last: int) -> None:
-        view_depth.vote(padded, -1, *who, *limits, out[first:last], first, last)
-
-    in_bands(out.shape[0], out, vote)
+    in_bands(out.shape[0], out, lambda *band: view_depth.vote(padded, -1, *who, *limits, out, -1, *band))
     return out
 
 
@@ -53,46 +49,6 @@ def test_vote(seed: int, shape: Shape, count: int, holes: float, limits: twins.L
     found, expected = voted(maps, ballot, limits), twins.vote(maps, ballot, limits)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-4)
     assert holes < 1 or (found == view_depth.UNKNOWN).all()
-
-
-@settings(max_examples=60, deadline=None)
-@given(
-    seeds,
-    st.tuples(st.integers(1, 90), st.integers(1, 40)),
-    st.integers(1, 4),
-    st.sampled_from([0.0, 0.2, 1.0]),
-    st.sampled_from([0.5, 0.54, 0.99]),
-)
-def test_maps_moved_and_voted_on_in_one_go(
-    seed: int, shape: Shape, count: int, holes: float, reach: float
-) -> None:
-    """The same as one after the other, wherever bands end; few of a tall view's rows are kept at a time."""
-    rng = np.random.default_rng(seed)
-    maps = smoother(some_maps(rng, count, shape), rng)
-    maps[rng.random(maps.shape) < holes] = np.nan
-    lumas = rng.choice(np.array([7, 25, 90], np.float32), (count, shape[0] + 4, shape[1] + 4))
-    shifts = (rng.integers(-16, 17, (count, 2)) / 8).astype(np.float32)
-    weights = (rng.integers(1, 17, count) / 16).astype(np.float32)
-    one_by_one = np.empty((count, shape[0] + 2, shape[1] + 2 * view_depth.MARGIN), np.float32)
-    for disparity, shift, out in zip(maps, shifts, one_by_one, strict=True):
-        view_depth.splat(disparity, *shift, reach, out)
-    inner = one_by_one[:, :, view_depth.MARGIN - 1 : 1 - view_depth.MARGIN]
-    expected = voted(inner, twins.Ballot(maps, lumas, shifts, weights), LIMITS)
-    found = np.full(shape, np.nan, np.float32)
-    extents = np.array([view_planes.extent(disparity) for disparity in maps], np.float32)
-    who = np.arange(count), maps, extents, in_pairs(lumas), shifts, weights, reach
-
-    def make(first: int, last: int) -> None:
-        view_depth.move_and_vote(*who, *LIMITS, found[first:last], first, last)
-
-    in_bands(shape[0], found, make)
-    np.testing.assert_array_equal(found, expected)
-
-
-def test_the_extent_of_a_map() -> None:
-    values = np.array([[np.nan, 3.5, -2], [np.nan, 7.25, np.nan]], np.float32)
-    assert view_planes.extent(values) == (-2, 7.25)
-    assert view_planes.extent(np.full((2, 3), np.nan, np.float32)) == (0, 0)
 
 
 @pytest.mark.parametrize(

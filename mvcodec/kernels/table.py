@@ -48,9 +48,7 @@ MATCHING = (
     "matching_rows.fuse_maps",
 )
 RENDERING = (
-    "view_depth.move_and_vote",
-    "view_depth.restore_thin",
-    "view_depth.fill_background",
+    "view_sweep.disparity_rows",
     "view_colour.blend",
     "view_quick.blend",
     "camera_mixing.mix",

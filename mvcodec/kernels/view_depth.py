@@ -14,7 +14,7 @@ from mvcodec.kernels import depth_runs
 from mvcodec.kernels.depth_runs import move_run, vote_run
 from mvcodec.kernels.lanes import COUNT
 from mvcodec.kernels.view_fetch import BORDER
-from mvcodec.kernels.view_marks import list_bits, list_marked
+from mvcodec.kernels.view_marks import list_bits
 from mvcodec.kernels.view_vectors import LEVELS
 
 FloatMap = NDArray[np.float32]
@@ -23,12 +23,6 @@ UNKNOWN = np.float32(depth_runs.UNKNOWN)
 
 MARGIN = COUNT
 """Columns beside a moved map, which runs of pixels may read and write."""
-
-STEP = 8
-"""Rows of a view that are put to the vote at a time."""
-
-FEWEST_ALIKE = 2
-"""Pixels of a line have as many neighbours on it."""
 
 
 @njit(cache=True, nogil=True)
@@ -53,11 +47,11 @@ def splat(disparity: FloatMap, shift_x: float, shift_y: float, reach: float, out
     flat = out.ravel()
     flat[:] = UNKNOWN
     rows = np.int32(0), np.int32(height + 1), np.int32(-1)
-    _move_rows(disparity, (np.float32(shift_x), np.float32(shift_y)), reach, flat, 0, rows, 0, height)
+    move_rows(disparity, (np.float32(shift_x), np.float32(shift_y)), reach, flat, 0, rows, 0, height)
 
 
 @njit(cache=True, nogil=True)
-def _move_rows(disparity, shift, reach, flat, start, rows, first, last):  # type: ignore[no-untyped-def]
+def move_rows(disparity, shift, reach, flat, start, rows, first, last):  # type: ignore[no-untyped-def]
     """Move rows first..last-1 of a map; `flat`, `start` and `rows` as in `move_run`."""
     height, width = disparity.shape
     spill = np.float32(1) - np.float32(reach)
@@ -165,6 +159,7 @@ def vote(
     ratio: float,
     denial: float,
     out: FloatMap,
+    wrap_out: int,
     first: int,
     last: int,
 ) -> None:
@@ -184,7 +179,8 @@ def vote(
         lumas: int16 (R, H + 4, W + 4, 2), see `view_planes.split_luma`; of any size where denial is 0.
         shifts: float32 (N, 2), px (x, y) from the view to the camera for each px of disparity.
         weights: float32 (N,), of the cameras, above 0.
-        out: float32 (last - first, W), overwritten; UNKNOWN where no camera knows.
+        out: float32 (rows, W), rows first..last-1 overwritten; UNKNOWN where no camera knows.
+        wrap_out: the bits of a row's number that say which row of `out` it is.
     """
     count, width = moved.shape[0], out.shape[1]
     near = np.empty(count, np.float32)
@@ -193,7 +189,7 @@ def vote(
     limits = near_px, np.float32(LEVELS * contrast)
     flat, mean = moved.ravel(), np.empty(width + COUNT, np.float32)
     step, stride = moved.shape[1] * moved.shape[2], moved.shape[2]
-    chosen = np.empty(width, np.int32)
+    chosen = np.empty(width + COUNT, np.int32)
     for y in range(first, last):
         apart, row = 0, (y + 1) & wrap
         for x in range(0, width, COUNT):
@@ -215,107 +211,7 @@ def vote(
             mean[x] = _outvote(
                 x, y, near, who, known, cameras, maps, lumas, shifts, weights, limits, least, share
             )
-        out[y - first] = mean[:width]
-
-
-@njit(cache=True, nogil=True)
-def move_and_vote(
-    cameras: NDArray[np.int64],
-    maps: NDArray[np.float32],
-    extents: NDArray[np.float32],
-    lumas: NDArray[np.int16],
-    shifts: NDArray[np.float32],
-    weights: NDArray[np.float32],
-    reach: float,
-    tolerance: float,
-    contrast: float,
-    ratio: float,
-    denial: float,
-    out: FloatMap,
-    first: int,
-    last: int,
-) -> None:
-    """Move the cameras' maps to a view (`splat`) and put them to the vote (`vote`), rows first..last-1.
-
-    Both go down the picture together: of the moved maps no more rows are kept than one row of a map can
-    reach, few enough for the caches.
-
-    Args:
-        extents: float32 (R, 2), px, at most the least and at least the greatest disparity of each map.
-        out: float32 (last - first, W), overwritten; UNKNOWN where no camera knows.
-    """
-    count, (height, width) = cameras.size, maps.shape[1:]
-    before, beyond, tallest = np.empty(count, np.int64), np.empty(count, np.int64), 0
-    for i in range(count):
-        ends = shifts[i, 1] * extents[cameras[i], 0], shifts[i, 1] * extents[cameras[i], 1]
-        # Rows y + before..y + beyond of the map may cover row y of the view: rounded, and a row more.
-        before[i] = np.int64(np.floor(min(max(min(ends[0], ends[1]), -height), height))) - 2
-        beyond[i] = np.int64(np.ceil(min(max(max(ends[0], ends[1]), -height), height))) + 2
-        tallest = max(tallest, beyond[i] - before[i])
-    room = 1
-    while room < min(tallest + 2 + STEP, last - first):
-        room *= 2
-    stride = width + 2 * MARGIN
-    moved = np.full((count, room, stride), UNKNOWN, np.float32)
-    flat = moved.ravel()
-    rows = np.int32(first + 1), np.int32(last), np.int32(room - 1)
-    done = np.empty(count, np.int64)
-    for i in range(count):
-        done[i] = min(max(first + before[i], 0), height)
-    for y in range(first, last, STEP):
-        end = min(y + STEP, last)
-        for i in range(count):
-            until = min(max(end + beyond[i], done[i]), height)
-            shift = shifts[i, 0], shifts[i, 1]
-            _move_rows(maps[cameras[i]], shift, reach, flat, i * room * stride, rows, done[i], until)
-            done[i] = until
-        vote(
-            moved,
-            room - 1,
-            cameras,
-            maps,
-            lumas,
-            shifts,
-            weights,
-            tolerance,
-            contrast,
-            ratio,
-            denial,
-            out[y - first : end - first],
-            y,
-            end,
-        )
-        for i in range(count):
-            for row in range(y + 1, end + 1):
-                moved[i, row & (room - 1)] = UNKNOWN
-
-
-@njit(cache=True, nogil=True)
-def restore_thin(voted: FloatMap, tolerance: float, cleaned: FloatMap, first: int, last: int) -> None:
-    """Give back to a median's result what is no stray pixel but thin, rows first..last-1.
-
-    A known pixel that the median moved to another surface returns where FEWEST_ALIKE of its eight
-    neighbours lie on its own.
-
-    Args:
-        voted: float32 (H, W), px or UNKNOWN, as `vote` left it.
-        tolerance: px within which disparities are one surface.
-        cleaned: float32 (H, W), the median of `voted`, changed in place.
-    """
-    height, width = voted.shape
-    near = np.float32(tolerance)
-    marks, chosen = np.empty(width, np.uint8), np.empty(width, np.int32)
-    for y in range(first, last):
-        for x in range(width):
-            marks[x] = (voted[y, x] > UNKNOWN) & (abs(cleaned[y, x] - voted[y, x]) > near)
-        for x in chosen[: list_marked(marks, chosen)]:
-            d = voted[y, x]
-            alike = -1  # the pixel is like itself
-            for v in range(max(y - 1, 0), min(y + 2, height)):
-                for u in range(max(x - 1, 0), min(x + 2, width)):
-                    alike += abs(voted[v, u] - d) <= near
-            if alike >= FEWEST_ALIKE:
-                cleaned[y, x] = d
+        out[y & wrap_out] = mean[:width]
 
 
 @njit(cache=True, nogil=True)

@@ -6,10 +6,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvcodec.kernels.runs import first_of
+from mvcodec.kernels.lanes import COUNT
+from mvcodec.kernels.runs import first_of, marked
 
-BLOCK = 32
-"""Marks that are asked together, in one vector."""
+
+@njit(cache=True, nogil=True, inline="always")
+def list_bits(bits, x, chosen, count):  # type: ignore[no-untyped-def]
+    """Append the pixels that the bits say from x on to a list; how long it is then."""
+    while bits:
+        chosen[count] = x + first_of(bits)
+        count += 1
+        bits &= bits - np.uint32(1)
+    return count
 
 
 @njit(cache=True, nogil=True)
@@ -23,24 +31,11 @@ def list_marked(marks: NDArray[np.uint8], chosen: NDArray[np.int32]) -> int:
     Returns:
         How many there are.
     """
-    count = 0
-    for start in range(0, marks.size, BLOCK):
-        end = min(start + BLOCK, marks.size)
-        found = np.uint8(0)
-        for x in range(start, end):
-            found |= marks[x]
-        if found:
-            for x in range(start, end):
-                chosen[count] = x
-                count += marks[x]
-    return count
-
-
-@njit(cache=True, nogil=True, inline="always")
-def list_bits(bits, x, chosen, count):  # type: ignore[no-untyped-def]
-    """Append the pixels that the bits say from x on to a list; how long it is then."""
-    while bits:
-        chosen[count] = x + first_of(bits)
-        count += 1
-        bits &= bits - np.uint32(1)
+    count, end = 0, marks.size - marks.size % COUNT
+    for start in range(0, end, COUNT):
+        count = list_bits(marked(marks, start), start, chosen, count)
+    for x in range(end, marks.size):
+        if marks[x]:
+            chosen[count] = x
+            count += 1
     return count

@@ -136,7 +136,7 @@ def mark_contours(disparity: FloatMap, tolerance: float, fetchable: FloatMap) ->
 
 
 @njit(cache=True, nogil=True)
-def extent(disparity: FloatMap) -> tuple[float, float]:
+def extent(disparity):  # type: ignore[no-untyped-def]
     """The least and the greatest number of a map, float32 (H, W); (0, 0) where there is none."""
     height, width = disparity.shape
     least, most = np.full(width, np.inf, np.float32), np.full(width, -np.inf, np.float32)

@@ -16,7 +16,7 @@ from mvcodec.array import Position, Viewpoint
 from mvcodec.frames import DecodedSet, RenderedView
 from mvcodec.synthesis.camera_spread import FALLBACK
 from mvcodec.synthesis.cell_cameras import CellCameras, find_cameras, real_view
-from mvcodec.synthesis.view_disparity import Ballot, disparity_rows
+from mvcodec.synthesis.view_disparity import Ballot, make_rows
 from mvcodec.workers import check_threads, run_all, run_in_bands, threads
 
 TOLERANCE_PX = 1.5
@@ -65,14 +65,13 @@ class Quick:
 
         background_px = decoded.disparity_range_px[0]
         weights = _whole(cameras.weights, WEIGHTS)
+        sources = self._maps, self._extents, NO_LUMA
         disparity = np.empty(self._maps.shape[1:], np.float32)
         pixels = np.empty((*disparity.shape, 3), np.uint8)
         seen_by = np.empty(disparity.shape, np.uint8)
 
         def make(first: int, last: int) -> None:
-            disparity[first:last] = disparity_rows(
-                self._maps, self._extents, NO_LUMA, cameras, BALLOT, background_px, first, last
-            )
+            make_rows(*sources, cameras, BALLOT, background_px, disparity, first, last)
             kernel("view_quick.blend")(
                 cameras.places,
                 self._packed,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,7 +32,7 @@ def view_disparity(
     ballot: Ballot,
     background_px: float,
 ) -> FloatMap:
-    """Disparity of every pixel of a view; arguments as in `disparity_rows`.
+    """Disparity of every pixel of a view; arguments as in `make_rows`.
 
     Returns:
         float32 (H, W), px, known everywhere.
@@ -45,10 +44,9 @@ def view_disparity(
     smooth = np.empty_like(found) if ballot.speck_area_px > 1 else found
 
     def make(first: int, last: int) -> None:
-        rows = disparity_rows(maps, extents, lumas, seen, ballot, background_px, first, last)
-        found[first:last] = rows
+        make_rows(maps, extents, lumas, seen, ballot, background_px, found, first, last)
         if smooth is not found:
-            smooth[first:last] = rows
+            smooth[first:last] = found[first:last]
 
     run_in_bands(height, make)
     if smooth is not found:
@@ -57,16 +55,17 @@ def view_disparity(
     return smooth
 
 
-def disparity_rows(
+def make_rows(
     maps: NDArray[np.float32],
     extents: NDArray[np.float32],
     lumas: NDArray[np.int16],
     seen: CellCameras,
     ballot: Ballot,
     background_px: float,
+    out: FloatMap,
     first: int,
     last: int,
-) -> FloatMap:
+) -> None:
     """Disparity of rows first..last-1 of a view, specks not yet looked for.
 
     Args:
@@ -75,15 +74,11 @@ def disparity_rows(
         lumas: int16 (R, H + 4, W + 4, 2), see `mvcodec.kernels.view_planes`; not looked at where nothing may
             be denied.
         background_px: disparity of rows of which no camera knows anything.
-
-    Returns:
-        float32 (last - first, W), px, known everywhere.
+        out: float32 (H, W), px, rows first..last-1 overwritten, known everywhere.
     """
     from mvcodec.kernels.table import kernel
 
-    above, below = max(first - 1, 0), min(last + 1, maps.shape[1])  # the median asks one row beyond these
-    voted = np.empty((below - above, maps.shape[2]), np.float32)
-    kernel("view_depth.move_and_vote")(
+    kernel("view_sweep.disparity_rows")(
         seen.places,
         maps,
         extents,
@@ -95,13 +90,8 @@ def disparity_rows(
         ballot.contrast,
         ballot.ratio,
         ballot.denial,
-        voted,
-        above,
-        below,
+        background_px,
+        out,
+        first,
+        last,
     )
-    cleaned = cv2.medianBlur(voted, 3)
-    band = first - above, last - above
-    kernel("view_depth.restore_thin")(voted, ballot.tolerance_px, cleaned, *band)
-    kernel("view_depth.fill_background")(cleaned, background_px, *band)
-    rows: FloatMap = cleaned[slice(*band)]
-    return rows
