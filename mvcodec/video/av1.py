@@ -10,10 +10,11 @@ from mvcodec.video.av1_syntax import Av1Units
 from mvcodec.video.codec import PRESETS, Codec, VideoDecoder, VideoEncoder, VideoSettings
 from mvcodec.video.map_model import MapModel
 from mvcodec.video.pyav import PyavDecoder, PyavEncoder
+from mvcodec.video.watchdog import WatchedEncoder
 
 MAX_QP = 63
 
-DECODER = "libdav1d"
+LIBRARY, DECODER = "libsvtav1", "libdav1d"
 
 MAPS = MapModel(half_from=30, full=12, half=0, alternate=-5, fine_extra=0, octave=14)
 """H.264's model on this scale, whose steps are 2.4 times as close. Nobody has measured AV1's best maps."""
@@ -57,7 +58,20 @@ def av1_settings(kind: TrackKind) -> str:
 def av1_encoder(settings: VideoSettings) -> VideoEncoder:
     """SVT-AV1; closed GOPs, a sequence header with each keyframe, low-overhead format."""
     os.environ.setdefault("SVT_LOG", "0")  # what fails is told as an error; it reads this when it starts
-    return PyavEncoder("libsvtav1", av1_options(settings), settings)
+    options = av1_options(settings)
+
+    def fresh() -> VideoEncoder:
+        return PyavEncoder(LIBRARY, options, settings)
+
+    # Without delay SVT-AV1 (4.1) has just as many buffers for pictures as are referred to; on a busy machine
+    # its threads now and then wait for one that none of them frees.
+    return WatchedEncoder(fresh, _patience_s(settings), LIBRARY) if settings.low_delay else fresh()
+
+
+def _patience_s(settings: VideoSettings) -> float:
+    """Seconds that no picture takes, fifteen times what a keyframe of 1280 x 720 took at any effort."""
+    efforts = max(SVT_PRESETS.values()) - SVT_PRESETS[settings.preset]
+    return 10 + 4e-6 * settings.width * settings.height * 2 ** (efforts / 2)
 
 
 def av1_decoder(low_delay: bool = True) -> VideoDecoder:
