@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import socket
 import sys
 import threading
@@ -13,6 +12,7 @@ from collections.abc import Callable
 import uvicorn
 from starlette.types import ASGIApp
 
+from mvcodec.decoding.kept_memory import keep_freed_memory_of_a_server
 from mvcodec.errors import MvCodecWarning, SettingError
 from mvcodec.player.access import AccessRules, is_loopback
 from mvcodec.player.messages import MAX_MESSAGE_BYTES
@@ -20,10 +20,6 @@ from mvcodec.player.messages import MAX_MESSAGE_BYTES
 SWITCH_S = 0.0005
 """A picture is made in some twenty steps that each wait for the interpreter; at Python's own 5 ms a thread
 that is busy elsewhere doubles the time that the picture takes."""
-
-KEPT_BYTES = 1 << 30
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
-"""Of glibc's mallopt."""
 
 WILDCARDS = {
     "0.0.0.0": (socket.AF_INET, "192.0.2.1", "127.0.0.1"),
@@ -73,26 +69,11 @@ def serve(
             timeout_graceful_shutdown=GRACE_S,
         )
         sys.setswitchinterval(SWITCH_S)
-        _keep_freed_memory()
+        keep_freed_memory_of_a_server()
         on_ready(url)
         if open_browser:
             threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
         uvicorn.Server(config).run(sockets=[listener])
-
-
-def _keep_freed_memory() -> None:
-    """Let glibc keep what pictures leave behind, for the next ones.
-
-    By itself it gives blocks of that size back to the system, and a quarter of the time for
-    decoding a frame set goes into page faults. Where there is another allocator, nothing happens.
-    """
-    if sys.platform != "linux":
-        return
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
-    if mallopt is not None:
-        mallopt(M_ARENA_MAX, 1)
-        mallopt(M_MMAP_THRESHOLD, 32 << 20)  # the most that it takes
-        mallopt(M_TRIM_THRESHOLD, KEPT_BYTES)
 
 
 def _bind(host: str, port: int) -> socket.socket:
