@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_line import fails, succeeds
@@ -84,8 +85,13 @@ def test_what_is_chosen_reaches_the_quality_with_fewer_bits_than_the_model(
 class Made:
     """Trials of a codec that is a formula."""
 
-    def __init__(self, bits: Callable[[int, float], float], psnr_y: Callable[[int, float], float]) -> None:
-        self.bits, self.psnr_y, self.count = bits, psnr_y, 0
+    def __init__(
+        self,
+        bits: Callable[[int, float], float],
+        psnr_y: Callable[[int, float], float],
+        share: Callable[[EncoderConfig], float] = lambda _: 1.0,
+    ) -> None:
+        self.bits, self.psnr_y, self.share, self.count = bits, psnr_y, share, 0
 
     def __call__(self, config: EncoderConfig) -> Trial:
         self.count += 1
@@ -93,8 +99,9 @@ class Made:
         assert qp is not None
         assert not isinstance(layer, str)
         of_layer = math.inf if layer is None else layer
-        base = self.bits(qp, math.inf)
-        return Trial(config, self.bits(qp, of_layer), base, self.psnr_y(qp, of_layer))
+        share = self.share(config)
+        base, bits = share * self.bits(qp, math.inf), share * self.bits(qp, of_layer)
+        return Trial(config, bits, base, self.psnr_y(qp, of_layer))
 
 
 @pytest.mark.parametrize(("cheapest", "target_db"), [(25, 36.0), (20, 37.0), (31, 34.0)])
@@ -115,6 +122,52 @@ def test_the_base_with_the_fewest_bits_is_found(folder: Path, cheapest: int, tar
     assert target_db <= best.psnr_y <= target_db + joint_choice.CLOSE
     assert math.log(best.bits / 1e6) <= 0.004 + LEAST_GAIN + 0.5 * joint_choice.CLOSE
     assert made.count <= 26
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"prediction": "synthesis"}, ("nearest", True)),
+        ({"prediction": "synthesis", "second_reference": "none"}, ("none", True)),
+        ({"prediction": "synthesis", "disparity_qp": 27}, ("nearest", False)),
+        ({}, (None, False)),
+    ],
+)
+def test_what_is_left_open_is_chosen_where_it_pays(
+    folder: Path, given: dict[str, Any], expected: tuple[str | None, bool]
+) -> None:
+    """Beside cameras that play alone nothing is tried that older readers don't know."""
+
+    def share(config: EncoderConfig) -> float:
+        coarse = config.disparity_qp is not None and config.disparity_qp != given.get("disparity_qp")
+        return (0.9 if config.second_reference == "nearest" else 1) * (0.9 if coarse else 1)
+
+    def psnr_y(qp: int, layer: float) -> float:
+        return 43.5 - 0.15 * qp - (0.3 * min(layer, 51) - 5)
+
+    def bits(qp: int, layer: float) -> float:
+        if layer == math.inf:
+            return 1e5
+        return 1e6 * math.exp(0.004 * (qp - 25) ** 2 + 0.5 * (psnr_y(qp, layer) - 36.0))
+
+    made, config = Made(bits, psnr_y, share), replace(CONFIG, **given)
+    array = open_input([folder])
+    best = joint_choice._Search(array, config, 36.0, made, made).best().config  # type: ignore[arg-type]
+    coarse = best.disparity_qp is not None and best.disparity_qp != given.get("disparity_qp")
+    assert (best.second_reference, coarse) == expected
+
+
+def test_the_layer_gets_finer_until_the_quality_is_seen_to_be_reached(folder: Path) -> None:
+    """Quantizers are whole numbers: a small change of the QP may change nothing."""
+
+    def psnr_y(qp: int, layer: float) -> float:
+        return 43.5 - 0.15 * qp - (0.15 * round(2 * min(layer, 51)) - 5)
+
+    made = Made(lambda qp, layer: 1e6 * math.exp(0.5 * psnr_y(qp, layer) + 0.004 * (qp - 25) ** 2), psnr_y)
+    array = open_input([folder])
+    target = psnr_y(25, 29) + 0.005
+    best = joint_choice._Search(array, CONFIG, target, made, made).best()  # type: ignore[arg-type]
+    assert best.psnr_y >= target
 
 
 def test_no_layer_is_chosen_where_none_pays(folder: Path) -> None:

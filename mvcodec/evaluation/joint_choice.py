@@ -14,7 +14,6 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from mvcodec.capture import ArraySource
 from mvcodec.encoding.config import AUTO, EncoderConfig
@@ -43,6 +42,9 @@ target, and of the result, which is above it."""
 
 LEAST_GAIN = 0.002
 """Share of the bits that a change of the base has to save."""
+
+COARSER_MAPS = 5
+"""QPs, on libx264's scale, by which maps are tried coarser than their model has them."""
 
 LEAST_STEP, DIGITS = 0.1, 2
 """QPs of the layer: the least change, and the decimals that are kept."""
@@ -80,7 +82,7 @@ def choose_together(
 ) -> Chosen:
     """Choose the pictures' QP, the layer's, whether there is one, and what is left open of how all is coded.
 
-    Left open may be the maps' scale and the second reference of what is predicted.
+    Left open may be the maps' scale and QP, and the second reference of what is predicted.
 
     Args:
         chosen: frame numbers of the input, consecutive.
@@ -127,7 +129,7 @@ def choose_for_rate(
         settled = replace(settled, disparity_cameras=config.cameras_for(array))
     with tempfile.TemporaryDirectory() as folder, MapSpool(Path(folder)) as spool:
         trials = Trials(source, chosen, probed(chosen), synthesizer, spool, on_coding)
-        search = _Search(source, settled, 0.0, trials, trials)
+        search = _Search(source, settled, 0.0, trials, trials, maps_follow=True)
         best = search.cheapest_at(per_set)
         if best.config.enhance is None:
             found = replace(config, enhance=None, enhance_views=None, enhance_chain=None)
@@ -139,11 +141,23 @@ def choose_for_rate(
 
 
 class _Search:
-    """One search; the slopes are on the codec's own scale of QPs."""
+    """One search; the slopes are on the codec's own scale of QPs.
+
+    Args:
+        maps_follow: the maps' QP will follow the pictures' as it changes, so that none is chosen.
+    """
 
     def __init__(
-        self, source: ArraySource, config: EncoderConfig, target_db: float, probes: Trials, checks: Trials
+        self,
+        source: ArraySource,
+        config: EncoderConfig,
+        target_db: float,
+        probes: Trials,
+        checks: Trials,
+        *,
+        maps_follow: bool = False,
     ) -> None:
+        self._maps_follow = maps_follow
         self._array, self._config, self._target = source.array, config, target_db
         self._try, self._check = probes, checks
         self._layer_views = len(enhanced_views(source.array, config.enhance_views))
@@ -179,20 +193,37 @@ class _Search:
                 best, moved = moved, self._moved(moved, direction)
             if best is not start:
                 break
-        for change in self._changes(best):
-            changed = self._brought(self._try(replace(best.config, **change)))
-            best = changed if self._pays(changed, best) else best
+        for change in (self._small_maps, self._coarse_maps, self._nearest):
+            config = change(best.config)
+            if config is not None:
+                changed = self._brought(self._try(config))
+                best = changed if self._pays(changed, best) else best
         return self._alone(best) or best
 
-    def _changes(self, best: Trial) -> list[dict[str, Any]]:
-        """Settings that were left open, as they are tried beside the best base and layer, one by one."""
-        found: list[dict[str, Any]] = []
-        if self._config.disparity_scale is None and best.config.scale_for(self._array) == 1:
-            found.append({"disparity_scale": 2})
-        if self._config.second_reference is None and self._config.prediction != "none":
-            # Beside cameras that play alone the layer stays one that older readers know.
-            found.append({"second_reference": "nearest"})
-        return found
+    def _small_maps(self, config: EncoderConfig) -> EncoderConfig | None:
+        """With maps of half size, if that was left open."""
+        is_open = self._config.disparity_scale is None and config.scale_for(self._array) == 1
+        return replace(config, disparity_scale=2) if is_open else None
+
+    def _coarse_maps(self, config: EncoderConfig) -> EncoderConfig | None:
+        """With coarser maps, if that was left open: theirs was chosen for what is rendered by them."""
+        span = config.disparity_range_px
+        is_open = config.disparity_qp is None and config.prediction != "none" and not self._maps_follow
+        if not is_open or span is None:
+            return None
+        qp = config.rate_of_maps(self._array, span).qp
+        assert qp is not None
+        return replace(
+            config, disparity_qp=min(qp + round(COARSER_MAPS * self._codec.qp_line[0]), self._max_qp)
+        )
+
+    def _nearest(self, config: EncoderConfig) -> EncoderConfig | None:
+        """With second references, if that was left open and cameras are predicted.
+
+        Beside cameras that play alone the layer stays one that older readers know.
+        """
+        is_open = self._config.second_reference is None and config.prediction != "none"
+        return replace(config, second_reference="nearest") if is_open else None
 
     def _about(self) -> Trial:
         """A base with the layer that the model has for it, not far from the target."""

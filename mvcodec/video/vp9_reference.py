@@ -30,7 +30,6 @@ MAX_QUANTIZER = 63
 SPEEDS = (0, 8)
 BLOCK = 8
 _GREY = 128
-_START_QUANTIZER = 63
 _HEAD = struct.Struct("<IB")
 _SIZE = struct.Struct("<H")
 _PLACES = (libvpx.GOLDEN, libvpx.ALTREF)
