@@ -137,6 +137,7 @@ def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixtu
             ["encode", "in", "o.mcap", "--gird", "2x2"],
             "which the command does not take; did you mean --grid?",
         ),
+        (["encode", "in", "o.mcap", "--out"], "found --out, which the command does not take (see"),
         (["encode", "in", "o.mcap", "--bitrate", "fast"], "--bitrate: found 'fast'"),
     ],
 )

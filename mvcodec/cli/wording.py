@@ -43,6 +43,7 @@ def with_suggestion(error: SettingError) -> str:
 
 
 def meant(found: str, names: Sequence[str]) -> str:
-    """`; did you mean X?`, or nothing where no name is like it."""
-    close = get_close_matches(found.lower(), names, 1)
+    """`; did you mean X?`, or nothing where no name is like it. Dashes that all options have say nothing."""
+    plain = {name.lstrip("-"): name for name in names}
+    close = [plain[name] for name in get_close_matches(found.lower().lstrip("-"), plain, 1)]
     return f"; did you mean {close[0]}?" if close and close[0] != found else ""
