@@ -50,10 +50,6 @@ def _move_run(_typing, disparity, out, start, x, y, width, height, shift_x, shif
             pixel = (target + 1.5).to_words()
             return pixel, target + 1.0 - pixel.to_floats()
 
-        column, right = along(filled(builder, builder.sitofp(x, FLOAT)) + lanes, shift_x, width)
-        row, down = along(filled(builder, builder.sitofp(y, FLOAT)), shift_y, height)
-        column = column + COUNT - 1 - constant(builder, WORD, range(COUNT))
-
         def there_of(row, column):  # type: ignore[no-untyped-def]
             """How far from their places the pixels land, and which of them are written."""
             return (row & bits) * filled(builder, stride) + column, row.is_(">=", least) & row.is_("<=", most)
@@ -74,16 +70,26 @@ def _move_run(_typing, disparity, out, start, x, y, width, height, shift_x, shif
             """Which neighbour is: -1, 1, 0 for none."""
             return one.where(part.is_(">=", spill)) - one.where((part * -1.0).is_(">=", spill))
 
-        apart, written = there_of(row, column)
-        rounds(builder, apart, known & written, work)
-        with some(right.size().most(down.size()).is_(">=", spill)):  # one test: most pixels cover one place
-            beside, above = covered_too(right), covered_too(down)
-            aside, over = beside.is_("!=", 0) & known, above.is_("!=", 0) & known
-            others = (row, column + beside, aside), (row + above, column, over)
-            for to_row, to_column, also in (*others, (row + above, column + beside, aside & over)):
-                apart, written = there_of(to_row, to_column)
-                with some(also & written):
-                    rounds(builder, apart, also & written, work)
+        def move(row, down):  # type: ignore[no-untyped-def]
+            column, right = along(filled(builder, builder.sitofp(x, FLOAT)) + lanes, shift_x, width)
+            column = column + COUNT - 1 - constant(builder, WORD, range(COUNT))
+            apart, written = there_of(row, column)
+            rounds(builder, apart, known & written, work)
+            # One test: most pixels cover one place.
+            with some(right.size().most(down.size()).is_(">=", spill)):
+                beside, above = covered_too(right), covered_too(down)
+                aside, over = beside.is_("!=", 0) & known, above.is_("!=", 0) & known
+                others = (row, column + beside, aside), (row + above, column, over)
+                for to_row, to_column, also in (*others, (row + above, column + beside, aside & over)):
+                    apart, written = there_of(to_row, to_column)
+                    with some(also & written):
+                        rounds(builder, apart, also & written, work)
+
+        row, down = along(filled(builder, builder.sitofp(y, FLOAT)), shift_y, height)
+        # Of a row that is moved for the sake of few of its pixels most sixteens end here.
+        within = row.is_(">=", least - 1) & row.is_("<=", most + 1)
+        with some(known & within):
+            move(row, down)
         return context.get_dummy_value()
 
     return types.void(*arguments), generate
