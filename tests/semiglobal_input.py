@@ -49,11 +49,14 @@ def joint_costs(
     low: int,
     lone_cost: int = 6,
     levels: int = LEVELS,
+    windows: list[tuple[int, int]] | None = None,
 ) -> NDArray[np.uint8]:
-    """Of camera 0 against all others: (H, W, levels)."""
+    """Of camera 0 against all others: (H, W, levels), or of windows of 2 rows side by side."""
     width = planes.shape[3]
     columns = -(-width // LANES) * LANES
-    volume = np.full((planes.shape[1], levels, columns), 77, np.uint8)
+    places = windows or [(0, column) for column in range(0, columns, LANES)]
+    shape = 2 if windows else planes.shape[1], levels, len(places) * LANES
+    volume = np.full(shape, 77, np.uint8)
 
     def with_borders(rows: NDArray[np.uint8]) -> NDArray[np.uint8]:
         beyond = (LANES, columns - width + LANES)
@@ -73,10 +76,10 @@ def joint_costs(
         *LIMITS,
         lone_cost,
         100,
-        0,
+        np.array(places),
         volume,
     )
-    return volume[..., :width].transpose(0, 2, 1)
+    return volume.transpose(0, 2, 1) if windows else volume[..., :width].transpose(0, 2, 1)
 
 
 def uniform_costs(

@@ -171,11 +171,15 @@ def seen_at(x: int, y: int, step: NDArray[np.float32], disparity: float) -> tupl
 
 
 def confirmed(
-    disparity: FloatMap, others: NDArray[np.float32], steps: NDArray[np.float32], tolerance: float
+    disparity: FloatMap,
+    asked: Mask,
+    others: NDArray[np.float32],
+    steps: NDArray[np.float32],
+    tolerance: float,
 ) -> Mask:
     height, width = disparity.shape
     kept = np.zeros((height, width), np.bool_)
-    for y, x in np.ndindex(height, width):
+    for y, x in zip(*np.nonzero(asked), strict=True):
         votes = []
         for other, step in zip(others, steps, strict=True):
             u, v = seen_at(x, y, step, float(disparity[y, x]))
@@ -185,6 +189,24 @@ def confirmed(
         through = sum(vote < -tolerance for vote in votes)
         kept[y, x] = agree >= max(through, 1)
     return kept
+
+
+def seen_through(
+    disparity: FloatMap,
+    asked: Mask,
+    others: NDArray[np.float32],
+    sure: NDArray[np.bool_],
+    steps: NDArray[np.float32],
+    farther: float,
+) -> Mask:
+    height, width = disparity.shape
+    found = np.zeros((height, width), np.bool_)
+    for y, x in zip(*np.nonzero(asked), strict=True):
+        for other, known, step in zip(others, sure, steps, strict=True):
+            u, v = seen_at(x, y, step, float(disparity[y, x]))
+            if 0 <= u < width and 0 <= v < height and known[v, u]:
+                found[y, x] |= other[v, u] < disparity[y, x] - farther
+    return found
 
 
 def completion_costs(

@@ -16,6 +16,7 @@ from mvcodec.errors import SettingError
 from mvcodec.frames import DecodedSet
 from mvcodec.kernels import table
 from mvcodec.kernels.table import COLUMNS, DEFAULT, MATCHING, RENDERING, implemented_by, kernel
+from mvcodec.stereo.joint_settings import BALANCED, JointSettings
 from mvcodec.stereo.matchers import make_base_matcher
 from mvcodec.stereo.realtime import Realtime
 from mvcodec.synthesis.synthesizers import make_synthesizer
@@ -62,7 +63,8 @@ def test_matching_and_rendering_take_every_kernel_from_the_table(
         column[name] = partial(recorded, name, implementation)
     array = linear_or_grid(2, 2, 64, 48)
     pictures = Planes(array, 2, 8).pictures()
-    matchers = make_base_matcher("joint"), make_base_matcher("sgbm"), Realtime(most_px=(100,))
+    made_small = Realtime(JointSettings(**BALANCED), most_px=(100,))
+    matchers = make_base_matcher("joint"), make_base_matcher("sgbm"), Realtime(most_px=(100,)), made_small
 
     def results() -> list[Any]:
         maps = [matcher.match(array, pictures, RANGE_PX) for matcher in matchers]

@@ -18,6 +18,7 @@ from semiglobal_input import (
 )
 
 from mvcodec.kernels import census, matching_costs
+from mvcodec.kernels.byte_vectors import LANES
 from mvcodec.stereo.matching_view import blindness
 
 
@@ -63,6 +64,20 @@ def test_joint_costs_equal_their_plain_twin(
     across = steps[:, 0] != 0
     expected = twins.joint_costs(planes, bits, bounds, blind, across, steps, low, LIMITS, 6, 100, LEVELS)
     np.testing.assert_array_equal(joint_costs(planes, bits, bounds, blind, across, steps, low=low), expected)
+
+
+def test_costs_of_windows_are_those_of_the_whole_picture() -> None:
+    height, width, steps = 7, 150, np.array([(1, 0), (0, 2)], np.float32)
+    planes, bits = random_bytes((3, height, 3, width), 3, spread=60), random_bytes((3, height, 8, width), 4)
+    bounds = np.sort(random_bytes((2, 3, height, 2, 3, width), 5, spread=60), axis=3)
+    given = planes, bits, bounds, random_bytes((2, height, width), 6, spread=60), steps[:, 0] != 0, steps
+    whole = joint_costs(*given, low=-2)
+    places = [(5, 0), (0, 3), (2, 130)]  # the last reaches beyond the right border
+    found = joint_costs(*given, low=-2, windows=places)
+    for number, (row, column) in enumerate(places):
+        expected = whole[row : row + 2, column : column + LANES]
+        shown = found[:, number * LANES :][:, : expected.shape[1]]
+        np.testing.assert_array_equal(shown, expected)
 
 
 def test_cost_adds_colour_and_census() -> None:

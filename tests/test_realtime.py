@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from stereo_scene import Planes, linear_or_grid
@@ -9,7 +11,7 @@ from stereo_scene import Planes, linear_or_grid
 from mvcodec.array import Position
 from mvcodec.frames import DisparityMap, Picture
 from mvcodec.stereo.joint import Joint
-from mvcodec.stereo.joint_settings import BALANCED, JointSettings
+from mvcodec.stereo.joint_settings import BALANCED, REALTIME, JointSettings
 from mvcodec.stereo.matcher import HalvingMatcher, SelectiveMatcher
 from mvcodec.stereo.realtime import Realtime
 
@@ -120,7 +122,7 @@ def test_surfaces_reach_over_soft_edges_of_the_whole_picture(plain_levels: int, 
         maps[camera] = DisparityMap(values, np.zeros(values.shape, np.bool_))
     matcher = Joint(JointSettings(**{**BALANCED, "plain_levels": plain_levels}))
     matcher.match(array, pictures, (0.0, 10.0))
-    found = matcher.refined(array, pictures, maps, (0.0, 10.0))[0, 0].values_px
+    found = matcher.refined(array, pictures, maps, (0.0, 10.0), array.real)[0, 0].values_px
     assert (found[:, : edge + 1] == 8).all()
     assert (found[:, edge + 1 :] == 2).all()
 
@@ -132,9 +134,14 @@ def test_what_no_partner_sees_is_not_valid() -> None:
     assert found.valid[:, 12:].mean() > 0.95
 
 
-def test_lone_camera_is_flat() -> None:
-    array = linear_or_grid(1, 1, 20, 10)
-    picture: Picture = np.zeros((10, 20, 3), np.uint8)
-    (found,) = Realtime(most_px=(0,)).match(array, {(0, 0): picture}, (-3.0, 9.0)).values()
+@pytest.mark.parametrize("settings", [REALTIME, BALANCED], ids=["realtime", "balanced"])
+def test_lone_camera_is_flat(settings: dict[str, Any]) -> None:
+    array = linear_or_grid(1, 1, 70, 80)
+    picture: Picture = np.zeros((80, 70, 3), np.uint8)
+    (found,) = (
+        Realtime(JointSettings(**settings), most_px=(0,))
+        .match(array, {(0, 0): picture}, (-3.0, 9.0))
+        .values()
+    )
     assert (found.values_px == -3).all()
     assert not found.valid.any()

@@ -63,6 +63,21 @@ def test_decisions_equal_those_by_equation_13(
         np.testing.assert_array_equal(seen, twins.partner_winners(sums, -2, (step[0], step[1])))
 
 
+def test_parts_of_pictures_side_by_side_are_decided_as_each_alone() -> None:
+    costs, grey = random_bytes((6, 140, LEVELS), 5, 150), random_bytes((6, 140), 6, 40)
+    volume, penalties = levels_second(costs), replace(PENALTIES, diagonals=False)
+
+    def costs_of(first: int, found: NDArray[np.uint8]) -> None:
+        found[..., :140] = volume[first : first + len(found)]
+
+    begins = [0, 64, 70]
+    together = decide(costs_of, grey, 0, LEVELS, penalties, Scratch(), begins=begins).disparity
+    for first, end in zip(begins, [*begins[1:], 140], strict=True):
+        part = slice(first, end)
+        alone = decided(costs[:, part], grey[:, part], penalties).disparity
+        np.testing.assert_array_equal(together[:, part], alone)
+
+
 @pytest.mark.parametrize("levels", [1, 2, 3])
 @pytest.mark.parametrize("penalties", [(0, 0, 0, 1.0), (9, 9, 9, 1.0), (2, 180, 0, 0.5)], ids=str)
 def test_few_levels_and_extreme_penalties(levels: int, penalties: tuple[int, int, int, float]) -> None:
@@ -163,8 +178,18 @@ def test_confirmed_equals_its_plain_twin(
     size: tuple[int, int], steps: NDArray[np.float32], tolerance: float
 ) -> None:
     own, *others = near_maps(size, 1 + len(steps), 8)
-    found = completion.confirmed(own, np.stack(others), steps, tolerance)
-    np.testing.assert_array_equal(found, twins.confirmed(own, np.stack(others), steps, tolerance))
+    asked = random_bytes(size, 9) < 200
+    given = own, asked, np.stack(others), steps, tolerance
+    np.testing.assert_array_equal(completion.confirmed(*given), twins.confirmed(*given))
+
+
+@size_parameter
+@steps_parameter
+def test_seen_through_equals_its_plain_twin(size: tuple[int, int], steps: NDArray[np.float32]) -> None:
+    own, *others = near_maps(size, 1 + len(steps), 8)
+    asked, sure = random_bytes(size, 9) < 200, random_bytes((len(steps), *size), 10) < 150
+    given = own, asked, np.stack(others), sure, steps, 1.0
+    np.testing.assert_array_equal(completion.seen_through(*given), twins.seen_through(*given))
 
 
 @pytest.mark.parametrize(
@@ -184,13 +209,14 @@ def test_confirmed_equals_its_plain_twin(
 )
 def test_confirmation_weighs_agreement_against_seeing_through(others: list[float], expected: bool) -> None:
     maps = np.stack([np.full((1, 1), other, np.float32) for other in others])
-    own = np.full((1, 1), 2.0, np.float32)
-    assert completion.confirmed(own, maps, np.zeros((len(others), 2), np.float32), 1.0)[0, 0] == expected
+    own, asked = np.full((1, 1), 2.0, np.float32), np.ones((1, 1), np.bool_)
+    steps = np.zeros((len(others), 2), np.float32)
+    assert completion.confirmed(own, asked, maps, steps, 1.0)[0, 0] == expected
 
 
 def test_nobody_confirms_what_is_out_of_their_frame() -> None:
-    own = np.full((1, 6), 2.0, np.float32)
-    kept = completion.confirmed(own, own[None], np.array([(1, 0)], np.float32), 1.0)
+    own, asked = np.full((1, 6), 2.0, np.float32), np.ones((1, 6), np.bool_)
+    kept = completion.confirmed(own, asked, own[None], np.array([(1, 0)], np.float32), 1.0)
     assert kept.tolist() == [[False, False, True, True, True, True]]
 
 

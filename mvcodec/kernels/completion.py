@@ -21,12 +21,17 @@ SLOPE_BITS = 7
 
 @njit(cache=True, nogil=True)
 def confirmed(
-    disparity: FloatMap, others: NDArray[np.float32], steps: NDArray[np.float32], tolerance: float
+    disparity: FloatMap,
+    asked: Mask,
+    others: NDArray[np.float32],
+    steps: NDArray[np.float32],
+    tolerance: float,
 ) -> Mask:
     """Where at least one other map agrees and no more see through the point than agree.
 
     Args:
         disparity: float32 (H, W), px.
+        asked: bool (H, W); what is not is not confirmed.
         others: float32 (P, H, W), maps of other cameras.
         steps: float32 (P, 2), as in `matching_costs.joint_costs`.
         tolerance: px.
@@ -35,6 +40,8 @@ def confirmed(
     kept = np.zeros((height, width), np.bool_)
     for y in range(height):
         for x in range(width):
+            if not asked[y, x]:
+                continue
             d = disparity[y, x]
             agree = through = 0
             for p in range(len(steps)):
@@ -48,6 +55,37 @@ def confirmed(
                         through += 1
             kept[y, x] = agree > 0 and agree >= through
     return kept
+
+
+@njit(cache=True, nogil=True)
+def seen_through(
+    disparity: FloatMap,
+    asked: Mask,
+    others: NDArray[np.float32],
+    sure: NDArray[np.bool_],
+    steps: NDArray[np.float32],
+    farther: float,
+) -> Mask:
+    """Where another map is sure to show what is behind the point.
+
+    Args:
+        disparity, asked, others, steps: as in `confirmed`.
+        sure: bool (P, H, W), what counts of the other maps.
+        farther: px; what is farther by more is behind it.
+    """
+    height, width = disparity.shape
+    found = np.zeros((height, width), np.bool_)
+    for y in range(height):
+        for x in range(width):
+            if not asked[y, x]:
+                continue
+            d = disparity[y, x]
+            for p in range(len(steps)):
+                u = int(np.rint(x - steps[p, 0] * d))
+                v = int(np.rint(y - steps[p, 1] * d))
+                if 0 <= u < width and 0 <= v < height and sure[p, v, u]:
+                    found[y, x] |= others[p, v, u] < d - farther
+    return found
 
 
 @njit(cache=True, nogil=True)

@@ -121,7 +121,7 @@ def joint_costs(
     most_bits: int,
     lone_cost: int,
     outside_cost: int,
-    start: int,
+    places: NDArray[np.int64],
     volume: Volume,
 ) -> None:
     """Costs of one of N cameras against its P partners, in units of two grey levels.
@@ -146,8 +146,9 @@ def joint_costs(
         colour_limit: most that colour counts; bit_cost: of each bit of the census, of which `most_bits` count
             at most. colour_limit + bit_cost * most_bits + lone_cost is below OUTSIDE.
         outside_cost: where no partner's picture holds the pixel.
-        volume: uint8 (R, levels, W'), written: of a band of rows; start: its first row; W' is W, rounded up
-            to LANES.
+        places: int64 (V, 2), the row and the column of the picture where each vector of LANES columns of the
+            volume begins. All its rows are in the picture, and its first column.
+        volume: uint8 (R, levels, V * LANES), written: of a band of rows, or of windows side by side.
     """
     _, height, channels, padded = planes.shape
     levels, words, columns = volume.shape[1], np.uint64(census.shape[2]), volume.shape[2]
@@ -168,8 +169,8 @@ def joint_costs(
     flat_planes, flat_census, flat_bounds = planes.reshape(-1), census.reshape(-1), bounds.reshape(-1)
     flat, flat_blind = volume.reshape(-1), blind.reshape(-1)
     for at in range(len(volume)):
-        y = start + at
-        for x in range(0, columns, LANES):
+        for v in range(len(places)):
+            y, x = places[v, 0] + at, places[v, 1]
             plane_here = np.uint64(((camera * height + y) * channels) * padded + LANES + x)
             census_here = np.uint64((camera * height + y) * census.shape[2] * padded + LANES + x)
             for level in range(levels):
@@ -199,4 +200,4 @@ def joint_costs(
                 only = least(lone, plus(plain, only_cost))
                 cost = choose(second, nowhere, only, least(lone, mean(best, second)))
                 cost = choose(best, nowhere, fill(np.uint8(outside_cost)), cost)
-                store(flat, np.uint64((at * levels + level) * columns + x), cost)
+                store(flat, np.uint64((at * levels + level) * columns + v * LANES), cost)

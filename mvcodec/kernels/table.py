@@ -37,6 +37,7 @@ MATCHING = (
     "semiglobal.decide_upwards",
     "completion.confirmed",
     "completion.completion_costs",
+    "completion.seen_through",
     "completion.unseen",
     "subpixel_pull.add_pull",
     "geodesic.carry",

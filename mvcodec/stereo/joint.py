@@ -11,7 +11,6 @@ is connected with best.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +25,21 @@ from mvcodec.stereo.consistency import (
     median_but_thin,
     without_specks,
 )
+from mvcodec.stereo.doubts import Blocks
 from mvcodec.stereo.exposure import camera_gains
 from mvcodec.stereo.joint_settings import JointSettings
-from mvcodec.stereo.matching_view import CameraPartners, MatchingViews, equal_grey, prepare_views
-from mvcodec.stereo.partners import neighbours, outside, partners, steps, unseen_border
+from mvcodec.stereo.matching_view import (
+    CameraPartners,
+    MatchingViews,
+    comparison,
+    equal_grey,
+    prepare_views,
+)
+from mvcodec.stereo.partners import neighbours, outside, steps, unseen_border
 from mvcodec.stereo.scanlines import MAX_SUM, ScratchPool, decide
+from mvcodec.stereo.second_look import look_again
 from mvcodec.stereo.soft_edges import widen
-from mvcodec.stereo.subpixel import refine
+from mvcodec.stereo.subpixel import refine_maps
 from mvcodec.workers import run_all
 
 
@@ -145,7 +152,25 @@ class Joint:
 
         maps = dict(zip(cameras, run_all(completed, cameras), strict=True))
         greys = {camera: views.grey_of(camera) for camera in cameras}
-        return _subpixel(array, greys, maps, valid, range_px, self.settings.subpixel_steps), valid
+        return refine_maps(array, greys, maps, valid, range_px, self.settings.subpixel_steps), valid
+
+    def equal_greys(self, pictures: Mapping[Position, Picture]) -> dict[Position, NDArray[np.uint8]]:
+        """uint8 (H, W) of each camera, as bright as matching last made them."""
+        return {camera: equal_grey(picture, self._gains[camera]) for camera, picture in pictures.items()}
+
+    def looked_at_again(
+        self,
+        array: CameraArray,
+        pictures: Mapping[Position, Picture],
+        maps: Mapping[Position, DisparityMap],
+        blocks: Mapping[Position, Blocks],
+        range_px: tuple[float, float],
+    ) -> dict[Position, DisparityMap]:
+        """Maps that small copies of these pictures gave last, with these blocks searched at full size."""
+        # Colours, and which partners are blind, make no difference beside contours: time saved.
+        gains = self._gains
+        views = prepare_views(array, pictures, gains, array.real, self._census, 0, colours=False)
+        return look_again(array, views, maps, blocks, range_px, self.settings, self._scratch)
 
     def refined(
         self,
@@ -153,14 +178,16 @@ class Joint:
         pictures: Mapping[Position, Picture],
         maps: Mapping[Position, DisparityMap],
         range_px: tuple[float, float],
+        cameras: Sequence[Position],
     ) -> dict[Position, DisparityMap]:
-        """Maps that small copies of these pictures gave last, sub-pixel by the pictures themselves."""
-        if not self.settings.full_size_steps or self._gains.keys() != set(array.real):
-            return dict(maps)
-        greys = {camera: equal_grey(pictures[camera], self._gains[camera]) for camera in array.real}
+        """Maps that small copies of these pictures gave last, sub-pixel by the pictures: of these cameras."""
+        count = self.settings.full_size_steps
+        if not count or self._gains.keys() != set(array.real):
+            return {camera: maps[camera] for camera in cameras}
+        greys = self.equal_greys(pictures)
         values = {camera: found.values_px for camera, found in maps.items()}
         valid = {camera: found.valid for camera, found in maps.items()}
-        moved = _subpixel(array, greys, values, valid, range_px, self.settings.full_size_steps)
+        moved = refine_maps(array, greys, values, valid, range_px, count, cameras)
         stacked = np.stack([greys[camera] for camera in array.real])
         return self._finished(self._widened(array, moved, stacked), valid)
 
@@ -189,41 +216,26 @@ class Joint:
         levels: int,
     ) -> tuple[FloatMap, Mask]:
         """The disparity of a camera by its own pictures, and what its own costs confirm, where asked."""
+        from mvcodec.kernels.byte_vectors import LANES
         from mvcodec.kernels.table import kernel
 
-        settings = self.settings
-        those = CameraPartners.of(array, camera)
+        settings, those = self.settings, CameraPartners.of(array, camera)
+        compare = comparison(array, those, views, low, settings)
+        columns = range(0, array.width, LANES)
 
         def costs_of(first: int, costs: NDArray[np.uint8]) -> None:
-            kernel("matching_costs.joint_costs")(
-                those.camera,
-                those.partners,
-                views.planes,
-                views.census,
-                those.across,
-                views.bounds,
-                views.blind[those.camera],
-                array.width,
-                those.steps,
-                low,
-                settings.colour_limit,
-                settings.bit_cost,
-                settings.most_bits,
-                settings.lone_cost,
-                settings.outside_cost,
-                first,
-                costs,
-            )
+            compare(np.array([(first, column) for column in columns]), costs)
 
         asked = those.steps if settings.self_check else None
         with self._scratch.lend() as scratch:
             found = decide(
                 costs_of, views.grey_of(camera), low, levels, settings.matching_penalties, scratch, asked
             )
+        seen = np.ones(found.disparity.shape, np.bool_)
         if asked is None:
-            return found.disparity, np.ones(found.disparity.shape, np.bool_)
+            return found.disparity, seen
         return found.disparity, kernel("completion.confirmed")(
-            found.disparity, found.partners, asked, settings.tolerance_px
+            found.disparity, seen, found.partners, asked, settings.tolerance_px
         )
 
     def _confirmed(
@@ -239,6 +251,7 @@ class Joint:
         others = [other for other in neighbours(array, camera) if other in raw]
         kept: Mask = kernel("completion.confirmed")(
             raw[camera],
+            np.ones(raw[camera].shape, np.bool_),
             np.stack([raw[other] for other in others]),
             steps(array, camera, others),
             self.settings.tolerance_px,
@@ -319,42 +332,6 @@ class Joint:
             carried,
         )
         return np.where(outside(array, camera, carried) & ~valid, carried, disparity)
-
-
-def _subpixel(
-    array: CameraArray,
-    greys: Mapping[Position, NDArray[np.uint8]],
-    maps: dict[Position, FloatMap],
-    valid: Mapping[Position, Mask],
-    range_px: tuple[float, float],
-    count: int,
-) -> dict[Position, FloatMap]:
-    """So many steps of refinement of all maps, each from where the last one left them."""
-    smooth = {camera: grey.astype(np.float32) for camera, grey in greys.items()}
-    for _ in range(count):
-        moved = run_all(partial(_refined, array, smooth, maps, valid), maps)
-        maps = dict(zip(maps, moved, strict=True))
-    return {camera: np.clip(values, *range_px) for camera, values in maps.items()}
-
-
-def _refined(
-    array: CameraArray,
-    greys: Mapping[Position, FloatMap],
-    maps: Mapping[Position, FloatMap],
-    valid: Mapping[Position, Mask],
-    camera: Position,
-) -> FloatMap:
-    beside = [partner for partner in partners(array, camera) if partner in maps]
-    if not beside:
-        return maps[camera]
-    said = [(greys[partner], maps[partner]) for partner in beside]
-    return refine(
-        maps[camera],
-        valid[camera],
-        greys[camera],
-        said,
-        steps(array, camera, beside),
-    )
 
 
 def _parts(disparity: FloatMap) -> NDArray[np.int16]:

@@ -87,6 +87,12 @@ class JointSettings:
         high=1000,
     )
     subpixel_steps: int = setting(2, "steps of sub-pixel refinement", low=0, high=20)
+    search_share: float = setting(
+        0,
+        "largest share of a picture that is searched at full size, where maps of small copies are in doubt",
+        low=0,
+        high=1,
+    )
     full_size_steps: int = setting(
         0,
         "steps of it after maps of small copies were brought back; surfaces reach further after these then",
@@ -132,7 +138,13 @@ SMALL_CENSUS: dict[str, Any] = {
     "jump": 85,
 }
 
-BALANCED: dict[str, Any] = {**SMALL_CENSUS, "median_size": 3, "subpixel_steps": 0, "full_size_steps": 2}
+BALANCED: dict[str, Any] = {
+    **SMALL_CENSUS,
+    "median_size": 3,
+    "search_share": 0.3,
+    "subpixel_steps": 0,
+    "full_size_steps": 1,
+}
 """Of what is matched in small copies (`mvcodec.stereo.realtime`)."""
 
 REALTIME: dict[str, Any] = {
@@ -152,6 +164,7 @@ SMALL_PICTURES: dict[str, Any] = {
     "beyond_partners": True,
     "plain_levels": 7,
     "median_size": 5,
+    "search_share": 0.0,
     "full_size_steps": 0,
 }
 """What pictures that are too small to be shrunk have time for in real time."""

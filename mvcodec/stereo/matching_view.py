@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.frames import Picture
+from mvcodec.stereo.joint_settings import JointSettings
 from mvcodec.stereo.partners import partners, steps
 from mvcodec.workers import run_all
 
@@ -26,10 +27,10 @@ class MatchingViews:
 
     Attributes:
         cameras: in the order of the arrays.
-        planes: uint8 (N, H, 3, W''), RGB at equal brightness.
+        planes: uint8 (N, H, C, W''), RGB at equal brightness, or luma alone.
         grey: uint8 (N, H, W), the same in luma.
         census: uint8 (N, H, B, W''), see `mvcodec.kernels.census.census_rows`.
-        bounds: uint8 (2, N, H, 2, 3, W''), least and greatest value within half a pixel along rows and along
+        bounds: uint8 (2, N, H, 2, C, W''), least and greatest value within half a pixel along rows and along
             columns (`matching_costs.sampling_interval`), of the cameras that are partners so.
         blind: uint8 (N, 2, H, W''), what matches along rows and along columns cost more (`blindness`).
     """
@@ -90,6 +91,8 @@ def prepare_views(
     cameras: Sequence[Position],
     census_radii: tuple[int, int],
     blind_cost: int,
+    *,
+    colours: bool = True,
 ) -> MatchingViews:
     """The real cameras' pictures, side by side.
 
@@ -98,20 +101,22 @@ def prepare_views(
         cameras: the ones to be matched.
         census_radii: of the census's window, px along rows and along columns.
         blind_cost: see `blindness`.
+        colours: whether colours are compared, else luma alone.
     """
     from mvcodec.kernels.byte_vectors import LANES
     from mvcodec.kernels.table import kernel
 
     count, height, width = len(array.real), array.height, array.width
+    channels = 3 if colours else 1
     radius_x, radius_y = census_radii
     words = -(-((2 * radius_x + 1) * (2 * radius_y + 1) - 1) // 8)
     padded, inside = LANES * (2 - -width // LANES), slice(LANES, LANES + width)
     found = MatchingViews(
         array.real,
-        np.empty((count, height, 3, padded), np.uint8),
+        np.empty((count, height, channels, padded), np.uint8),
         np.empty((count, height, width), np.uint8),
         np.empty((count, height, words, padded), np.uint8),
-        np.empty((2, count, height, 2, 3, padded), np.uint8),
+        np.empty((2, count, height, 2, channels, padded), np.uint8),
         np.zeros((count, 2, height, padded), np.uint8),
     )
     beside = {(camera[0] == other[0], other) for camera in cameras for other in partners(array, camera)}
@@ -119,19 +124,20 @@ def prepare_views(
     def prepare(number: int) -> None:
         camera = array.real[number]
         picture = _evened(pictures[camera], gains[camera])
-        planes = np.ascontiguousarray(picture.transpose(0, 2, 1))
+        grey = found.grey[number]
+        cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY, grey)
+        planes = np.ascontiguousarray(picture.transpose(0, 2, 1)) if colours else grey[:, None]
         found.planes[number][..., inside] = planes
-        cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY, found.grey[number])
         bits = np.empty((height, words, width), np.uint8)
-        kernel("census.census_rows")(found.grey[number], radius_x, radius_y, bits)
+        kernel("census.census_rows")(grey, radius_x, radius_y, bits)
         found.census[number][..., inside] = bits
-        bounds = np.empty((height, 2, 3, width), np.uint8)
+        bounds = np.empty((height, 2, channels, width), np.uint8)
         for side, along_rows in enumerate((True, False)):
             if (along_rows, camera) in beside:
                 kernel("matching_costs.sampling_interval")(planes, along_rows, bounds)
                 found.bounds[side, number][..., inside] = bounds
         if blind_cost and len(array.real_rows) > 1 and len(array.real_cols) > 1:
-            found.blind[number][..., inside] = blindness(found.grey[number], census_radii, blind_cost)
+            found.blind[number][..., inside] = blindness(grey, census_radii, blind_cost)
 
     run_all(prepare, range(count))
     return found
@@ -162,3 +168,37 @@ class CameraPartners:
             np.array([other[0] == camera[0] for other in beside]),
             steps(array, camera, beside),
         )
+
+
+def comparison(
+    array: CameraArray, those: CameraPartners, views: MatchingViews, low: int, settings: JointSettings
+) -> Callable[[NDArray[np.int64], NDArray[np.uint8]], None]:
+    """What writes the costs of a camera; see places and volume of `matching_costs.joint_costs`.
+
+    Args:
+        low: disparity of level 0, px.
+    """
+    from mvcodec.kernels.table import kernel
+
+    def compare(places: NDArray[np.int64], volume: NDArray[np.uint8]) -> None:
+        kernel("matching_costs.joint_costs")(
+            those.camera,
+            those.partners,
+            views.planes,
+            views.census,
+            those.across,
+            views.bounds,
+            views.blind[those.camera],
+            array.width,
+            those.steps,
+            low,
+            settings.colour_limit,
+            settings.bit_cost,
+            settings.most_bits,
+            settings.lone_cost,
+            settings.outside_cost,
+            places,
+            volume,
+        )
+
+    return compare

@@ -15,6 +15,7 @@ import numpy as np
 
 from mvcodec.array import CameraArray, Position
 from mvcodec.frames import DisparityMap, Picture
+from mvcodec.stereo.doubts import Blocks, doubtful, most_doubtful
 from mvcodec.stereo.joint import Joint
 from mvcodec.stereo.joint_settings import REALTIME, SMALL_PICTURES, JointSettings
 from mvcodec.workers import run_all
@@ -34,7 +35,8 @@ class Realtime:
     def __init__(self, settings: JointSettings | None = None, most_px: tuple[int, ...] = MOST_PX) -> None:
         """Match at half the size where pictures have more than most_px[0] pixels, and so on."""
         chosen = settings or JointSettings(**REALTIME)
-        self._joint = Joint(chosen)
+        # What is searched again at full size is as good without diagonals before.
+        self._joint = Joint(replace(chosen, diagonals=chosen.diagonals and not chosen.search_share))
         steps = max(chosen.subpixel_steps, chosen.full_size_steps)
         self._unshrunk = Joint(replace(chosen, **SMALL_PICTURES, subpixel_steps=steps))
         self._most_px = most_px
@@ -60,8 +62,12 @@ class Realtime:
         if halvings == 0:
             maps = self._unshrunk.maps_of(array, pictures, range_px, matched, fresh)
         else:
-            maps = self._match_shrunk(array, pictures, range_px, matched, fresh, halvings)
-            maps = self._joint.refined(array, pictures, maps, range_px)
+            small, shrunk = self._small_maps(array, pictures, range_px, matched, fresh, halvings)
+            maps = _brought_back(small, pictures, shrunk)
+            if self._joint.settings.search_share and len(array.real) > 1:
+                blocks = self._doubtful_blocks(array, small, shrunk, range_px[1])
+                maps = self._joint.looked_at_again(array, pictures, maps, blocks, range_px)
+            maps = self._joint.refined(array, pictures, maps, range_px, cameras)
         return {camera: maps[camera] for camera in cameras}
 
     def match_halved(
@@ -95,8 +101,26 @@ class Realtime:
         if halvings == 0:
             return self._joint.maps_of(array, pictures, range_px, cameras, fresh)
         maps, shrunk = self._small_maps(array, pictures, range_px, cameras, fresh, halvings)
-        doubled = run_all(lambda camera: _doubled(maps[camera], pictures[camera], shrunk[camera]), cameras)
-        return dict(zip(cameras, doubled, strict=True))
+        return _brought_back(maps, pictures, shrunk)
+
+    def _doubtful_blocks(
+        self,
+        array: CameraArray,
+        maps: Mapping[Position, DisparityMap],
+        shrunk: Mapping[Position, Picture],
+        nearest_px: float,
+    ) -> dict[Position, Blocks]:
+        """Which blocks of the pictures small maps are in doubt of."""
+        small, size = _smaller(array), (array.height, array.width)
+        most = self._joint.settings.search_share
+        values = {camera: found.values_px for camera, found in maps.items()}
+        greys = self._joint.equal_greys(shrunk)
+
+        def blocks(camera: Position) -> Blocks:
+            doubts = doubtful(small, camera, values, greys)
+            return most_doubtful(doubts, values[camera], size, most, nearest_px)
+
+        return dict(zip(maps, run_all(blocks, maps), strict=True))
 
     def _small_maps(
         self,
@@ -108,10 +132,25 @@ class Realtime:
         halvings: int,
     ) -> tuple[dict[Position, DisparityMap], dict[Position, Picture]]:
         """Maps of copies of half the size, in their px, and the copies."""
-        small = replace(array, width=-(-array.width // 2), height=-(-array.height // 2))
+        small = _smaller(array)
         shrunk = dict(zip(pictures, run_all(_halved, pictures.values()), strict=True))
         span = range_px[0] / 2, range_px[1] / 2
         return self._match_shrunk(small, shrunk, span, cameras, fresh, halvings - 1), shrunk
+
+
+def _smaller(array: CameraArray) -> CameraArray:
+    """Of pictures of half the size."""
+    return replace(array, width=-(-array.width // 2), height=-(-array.height // 2))
+
+
+def _brought_back(
+    maps: Mapping[Position, DisparityMap],
+    pictures: Mapping[Position, Picture],
+    shrunk: Mapping[Position, Picture],
+) -> dict[Position, DisparityMap]:
+    """Maps of copies of half the size, as large as the pictures."""
+    doubled = run_all(lambda camera: _doubled(maps[camera], pictures[camera], shrunk[camera]), maps)
+    return dict(zip(maps, doubled, strict=True))
 
 
 def _halved(picture: Picture) -> Picture:

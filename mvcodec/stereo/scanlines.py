@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
@@ -126,6 +126,7 @@ def decide(
     penalties: Penalties,
     scratch: Scratch,
     partner_steps: NDArray[np.float32] | None = None,
+    begins: Sequence[int] = (),
 ) -> Decided:
     """The disparity of least cost, band by band, so that memory holds a band and not the whole volume.
 
@@ -136,6 +137,7 @@ def decide(
         grey: uint8 (H, W), of the camera.
         low, levels: disparity of level 0, px, and how many levels there are.
         partner_steps: float32 (P, 2), see `semiglobal.take_partner_winners`; None: nothing about partners.
+        begins: columns where another part of a picture begins, which paths along rows do not enter.
     """
     from mvcodec.kernels.byte_vectors import LANES
     from mvcodec.kernels.table import kernel
@@ -160,7 +162,7 @@ def decide(
         known = reach
         band = costs[: stop - start]
         sums = scratch.array("sums", band.shape, np.uint16)
-        along = _along_rows(band, grey[start:stop], table, small, scratch)
+        along = _along_rows(band, grey[start:stop], table, small, scratch, begins)
         kernel("semiglobal.sum_downwards")(band, jumps[:, start:stop], small, *above, along, sums)
         # Nothing comes in from below the rows that are looked at.
         ways_up = jumps[:, start : reach + 1].copy()
@@ -209,6 +211,7 @@ def _along_rows(
     jumps: NDArray[np.uint8],
     small: int,
     scratch: Scratch,
+    begins: Sequence[int],
 ) -> NDArray[np.uint8]:
     """Both paths along rows, uint8 (2, R, levels, W'): those of turned bands of LANES rows."""
     from mvcodec.kernels.byte_vectors import LANES
@@ -228,6 +231,7 @@ def _along_rows(
         if width > 1:
             changes = cv2.absdiff(grey[band, 1:], grey[band, :-1])
             turned_jumps[1:width, :rows] = cv2.LUT(changes, jumps).T
+            turned_jumps[list(begins)] = 0
         for forwards, found in zip((True, False), along, strict=True):
             kernel("semiglobal.turned_path")(turned, turned_jumps, small, forwards, state, path)
             cv2.transpose(path.reshape(flat, LANES)[:, :rows], found[band].reshape(rows, flat))

@@ -6,13 +6,17 @@ enough for a least-squares step, in which all partners that see the point have t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mvcodec.array import CameraArray, Position
 from mvcodec.frames import FloatMap, Mask
+from mvcodec.stereo.partners import partners, steps
+from mvcodec.workers import run_all
 
 WINDOW_SIGMA_PX = 1.5
 MOST_PX = 0.4
@@ -65,3 +69,49 @@ def refine(
     windowed_weight = np.asarray(cv2.GaussianBlur(weight, (0, 0), WINDOW_SIGMA_PX), np.float32)
     change = np.clip(windowed_pull / (windowed_weight + DAMPING), -MOST_PX, MOST_PX)
     return np.asarray(disparity + np.where(valid, change, 0), np.float32)
+
+
+def refine_maps(
+    array: CameraArray,
+    greys: Mapping[Position, NDArray[np.uint8]],
+    maps: Mapping[Position, FloatMap],
+    valid: Mapping[Position, Mask],
+    range_px: tuple[float, float],
+    count: int,
+    cameras: Sequence[Position] | None = None,
+) -> dict[Position, FloatMap]:
+    """So many steps of refinement of all maps, each from where the last one left them.
+
+    Args:
+        greys: uint8 (H, W) of each camera; maps: float32 (H, W), px; valid: bool (H, W), what may change.
+        range_px: the values are clipped to it.
+        cameras: whose maps are wanted: the last step is theirs alone; None: all.
+    """
+    smooth = {camera: grey.astype(np.float32) for camera, grey in greys.items()}
+    found, wanted = dict(maps), list(maps) if cameras is None else list(cameras)
+    for step in range(count):
+        moving = wanted if step == count - 1 else list(found)
+        moved = run_all(partial(_refined, array, smooth, found, valid), moving)
+        found |= dict(zip(moving, moved, strict=True))
+    return {camera: np.clip(found[camera], *range_px) for camera in wanted}
+
+
+def _refined(
+    array: CameraArray,
+    greys: Mapping[Position, FloatMap],
+    maps: Mapping[Position, FloatMap],
+    valid: Mapping[Position, Mask],
+    camera: Position,
+) -> FloatMap:
+    """One step of one camera's map, by its partners that have one."""
+    beside = [partner for partner in partners(array, camera) if partner in maps]
+    if not beside:
+        return maps[camera]
+    said = [(greys[partner], maps[partner]) for partner in beside]
+    return refine(
+        maps[camera],
+        valid[camera],
+        greys[camera],
+        said,
+        steps(array, camera, beside),
+    )
