@@ -11,7 +11,7 @@ from mvcodec.array import Position
 from mvcodec.errors import StreamError
 from mvcodec.fields import Fields
 from mvcodec.stream import (
-    PREDICTOR,
+    PREDICTORS,
     REFERENCE_CODECS,
     StreamHeader,
     Track,
@@ -48,11 +48,13 @@ class EnhancementHeader:
         views: in the order of decoding.
         settings: the encoder's, for the record.
         second_reference: one of REFERENCE_CODECS.
+        predictor: one of PREDICTORS.
     """
 
     views: tuple[EnhancedView, ...]
     settings: Mapping[str, Any] = field(default_factory=dict)
     second_reference: str = "none"
+    predictor: str = PREDICTORS[-1]
 
     def to_json(self) -> bytes:
         """UTF-8 JSON as FORMAT.md specifies it."""
@@ -60,7 +62,7 @@ class EnhancementHeader:
         document = {
             "format": "mvcodec-enhancement",
             "version": LAYER_VERSION,
-            "predictor": PREDICTOR,
+            "predictor": self.predictor,
             "codec": REFERENCE_CODECS[self.second_reference],
             "views": views,
             "settings": dict(self.settings),
@@ -96,12 +98,12 @@ class EnhancementHeader:
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             found_text = f"a damaged enhancement header ({error})"
             raise StreamError(source, found_text, "the fields of FORMAT.md") from None
-        expected = ("mvcodec-enhancement", LAYER_VERSION, PREDICTOR)
-        second = second_reference_of(codec)
-        if said != expected or second is None:
-            known = " or ".join(REFERENCE_CODECS.values())
-            raise StreamError(source, f"an enhancement layer of {(*said, codec)}", f"{(*expected, known)}")
-        found = cls(views, settings, second)
+        expected = ("mvcodec-enhancement", LAYER_VERSION)
+        second, predictor = second_reference_of(codec), said[2]
+        if said[:2] != expected or predictor not in PREDICTORS or second is None:
+            known = " or ".join(PREDICTORS), " or ".join(REFERENCE_CODECS.values())
+            raise StreamError(source, f"an enhancement layer of {(*said, codec)}", f"{(*expected, *known)}")
+        found = cls(views, settings, second, predictor)
         found._check(header, source)
         return found
 

@@ -71,8 +71,9 @@ MAX_SEQUENCE = (1 << 32) - 1
 PREDICTIONS = ("none", "synthesis")
 """How real cameras are coded: each for itself, or from each other."""
 
-PREDICTOR = "warp-1"
-"""The one way of predicting pictures that there is; another one gets another name."""
+PREDICTORS = ("warp-1", "warp-2")
+"""The ways of predicting pictures that there are; another one gets another name. Encoders write the last one,
+whose predictions may have a share of a track's past (`mvcodec.video.past`)."""
 
 REFERENCE_CODECS = {"none": "vp9", "nearest": "vp9+nearest"}
 """Names of how predicted pictures are coded, by the second picture that each may build on beside its own past
@@ -127,6 +128,7 @@ class StreamHeader:
         predicted: the real cameras that are predicted from others, in the order of decoding.
         disparity_use: one of DISPARITY_USES.
         second_reference: one of REFERENCE_CODECS, of the predicted cameras.
+        predictor: one of PREDICTORS, of the predicted cameras.
     """
 
     array: CameraArray
@@ -139,6 +141,7 @@ class StreamHeader:
     predicted: tuple[PredictedCamera, ...] = ()
     disparity_use: str = "all"
     second_reference: str = "none"
+    predictor: str = PREDICTORS[-1]
 
     def __post_init__(self) -> None:
         low, high = self.disparity_range_px
@@ -251,7 +254,7 @@ class StreamHeader:
         if self.predicted:
             cameras = [{"camera": each.camera, "from": each.references} for each in self.predicted]
             codec = REFERENCE_CODECS[self.second_reference]
-            document["prediction"] = {"predictor": PREDICTOR, "codec": codec, "cameras": cameras}
+            document["prediction"] = {"predictor": self.predictor, "codec": codec, "cameras": cameras}
         return json.dumps(document, separators=(",", ":")).encode()
 
     @classmethod
@@ -295,14 +298,20 @@ class StreamHeader:
             disparity_cameras=fields.text("disparity_cameras", "all"),
             predicted=() if predicted is None else _predicted(predicted),
             second_reference="none" if predicted is None else _second_reference(predicted),
+            predictor=PREDICTORS[-1] if predicted is None else _predictor(predicted),
             disparity_use=fields.text("disparity_use", "all"),
         )
 
 
+def _predictor(fields: Fields) -> str:
+    found = fields.text("predictor")
+    if found not in PREDICTORS:
+        raise fields.wrong("predictor", found, " or ".join(PREDICTORS))
+    return found
+
+
 def _predicted(fields: Fields) -> tuple[PredictedCamera, ...]:
     """The header's `prediction`."""
-    if fields.text("predictor") != PREDICTOR:
-        raise fields.wrong("predictor", fields.text("predictor"), PREDICTOR)
     cameras = fields.get("cameras", "a list")
     try:
         return tuple(

@@ -111,7 +111,7 @@ def test_the_header_says_who_depends_on_whom() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"predictor": "warp-9"}, "prediction.predictor = warp-9, expected warp-1"),
+        ({"predictor": "warp-9"}, "prediction.predictor = warp-9, expected warp-1 or warp-2"),
         ({"codec": "h264"}, "prediction.codec = h264, expected vp9 or vp9+nearest"),
         ({"cameras": [{"camera": [1, 1], "from": []}]}, "real cameras that are decoded before"),
         (

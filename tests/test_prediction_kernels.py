@@ -22,6 +22,7 @@ from mvcodec.synthesis import prediction
 from mvcodec.synthesis.prediction import PredictionSource, predict, predicted_disparity
 from mvcodec.video.codec import Planes
 from mvcodec.video.colour import to_planes
+from mvcodec.video.past import MOST_SHARE, Past
 from mvcodec.video.vp9_reference import checksum
 from mvcodec.workers import threads
 
@@ -114,8 +115,8 @@ def scene_sources(array: CameraArray) -> tuple[PlaneScene, list[PredictionSource
     return scene, sources
 
 
-def predicted() -> tuple[Planes, Planes]:
-    """A view in the middle, and a camera from the three others."""
+def predicted() -> tuple[Planes, ...]:
+    """A view in the middle, a camera from the three others, and the view with a share of its past."""
     array = CameraArray(3, 3, 128, 80, 10.0, (0, 2), (0, 2), make_array(128, 80).calibration)
     scene, sources = scene_sources(array)
     maps = {source.place: source.disparity for source in sources}
@@ -126,7 +127,8 @@ def predicted() -> tuple[Planes, Planes]:
     assert np.abs(found.y.astype(int) - expected.y).mean() < 1
     unlike = np.abs(corner.y.astype(int) - sources[3].planes.y) > 2
     assert unlike.mean() < 0.25
-    return found, corner
+    before = Planes(*(np.roll(plane, (1, 2), (0, 1)) for plane in (found.y, found.u, found.v)))
+    return found, corner, Past(found, before).blended(MOST_SHARE)
 
 
 def test_planes_are_predicted_where_cameras_see_them_whatever_the_threads() -> None:

@@ -118,6 +118,14 @@ CASES: dict[str, Case] = {
         (0, 1, 2),
         {"qp": 40, "gop": 2, "disparity_scale": 2, "enhance": 30, "enhance_views": ((0, 1), (1, 2), (2, 3))},
     ),
+    "predicted_past": Case(
+        _calibrated(), (0, 1, 2, 3), {"qp": 36, "gop": 3, "disparity_scale": 2, "prediction": "synthesis"}
+    ),
+    "enhanced_past": Case(
+        _nominal(3, 3, 96, 80, 10.0),
+        (0, 1, 2, 3),
+        {"qp": 40, "gop": 3, "enhance": 34, "enhance_views": ((0, 1), (1, 1))},
+    ),
     "depth": Case(_calibrated(), (0, 1), {"qp": 34, "depth": True}),
     "hevc": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 30, "codec": "hevc", "gop": 2}),
     "av1": Case(_nominal(1, 2, 64, 48, 10.0), (0, 1, 2, 3), {"qp": 40, "codec": "av1", "gop": 2}),

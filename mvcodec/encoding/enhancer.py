@@ -18,7 +18,6 @@ from mvcodec.video.colour import even_size, to_planes
 from mvcodec.video.vp9_reference import (
     MAX_QUANTIZER,
     ReferenceSettings,
-    Vp9ReferenceDecoder,
     Vp9ReferenceEncoder,
 )
 from mvcodec.workers import run_all
@@ -144,8 +143,6 @@ class Enhancer:
             view: Vp9ReferenceEncoder(ReferenceSettings(*size, each, references, speed))
             for view, each in view_quantizers(self.header, quantizer).items()
         }
-        sources = {other for each in self._order for other in each.references}
-        self._mirrors = {each.view: Vp9ReferenceDecoder(size) for each in self._order if each.view in sources}
 
     def push(self, base: Sequence[Packet], pictures: Mapping[Position, Picture]) -> list[Packet]:
         """Code the layer of one frame set.
@@ -182,11 +179,9 @@ class Enhancer:
             units = run_all(
                 self._code, [each.view for each in ready], originals, predictions, [keyframe] * len(ready)
             )
-            for each, unit, prediction in zip(ready, units, predictions, strict=True):
+            for each, unit in zip(ready, units, strict=True):
                 found[each.view] = unit
-                if each.view in self._mirrors:
-                    mirror = self._mirrors[each.view]
-                    frame.add(each.view, mirror.push(unit, prediction, keyframe, each.track.topic))
+                frame.add(each.view, self._encoders[each.view].decoded)
             waiting = [each for each in waiting if each not in ready]
         return found
 

@@ -12,7 +12,6 @@ from mvcodec.video.colour import even_size
 from mvcodec.video.vp9_reference import (
     MAX_QUANTIZER,
     ReferenceSettings,
-    Vp9ReferenceDecoder,
     Vp9ReferenceEncoder,
 )
 from mvcodec.workers import run_all
@@ -87,7 +86,6 @@ class PredictedCameras:
         self._needed = {track for each in header.predicted for track in header.needed_tracks(each)}
         self._decoders = {track: codec.decoder() for track in self._needed - set(tracks)}
         self._encoders = {track: Vp9ReferenceEncoder(settings) for track in tracks}
-        self._mirrors = {track: Vp9ReferenceDecoder(size) for track in tracks}
 
     def push(
         self, coded: Mapping[Track, CodedPicture], pictures: Mapping[Position, Planes], keyframe: bool
@@ -109,7 +107,7 @@ class PredictedCameras:
             data = self._encoders[track].push(pictures[each.camera], predictions, keyframe)
             found[track] = CodedPicture(data, keyframe)
             if track in self._needed:
-                frame.add(each.camera, self._mirrors[track].push(data, predictions, keyframe, track.topic))
+                frame.add(each.camera, self._encoders[track].decoded)
         return found
 
     def _decode(self, track: Track, coded: CodedPicture) -> Planes:

@@ -22,6 +22,7 @@ from mvcodec.video import libvpx
 from mvcodec.video.access_unit import UnitFacts
 from mvcodec.video.bits import NalError
 from mvcodec.video.codec import Codec, Planes
+from mvcodec.video.past import MOST_SHARE, Past, best_share
 from mvcodec.video.vp9 import VP9
 from mvcodec.video.vp9_syntax import parse_frame
 
@@ -32,6 +33,7 @@ BLOCK = 8
 _GREY = 128
 _HEAD = struct.Struct("<IB")
 _SIZE = struct.Struct("<H")
+_SHARE = 16
 _PLACES = (libvpx.GOLDEN, libvpx.ALTREF)
 _NOT = (libvpx.NO_GOLDEN, libvpx.NO_ALTREF)
 _KEEP = libvpx.KEEP_GOLDEN | libvpx.KEEP_ALTREF
@@ -93,11 +95,18 @@ class ReferenceDecoder(Protocol):
 
 
 class Vp9ReferenceEncoder:
-    """See `ReferenceEncoder`."""
+    """See `ReferenceEncoder`. It decodes what it codes: the next prediction may have a share of that."""
+
+    @property
+    def decoded(self) -> Planes:
+        """The last picture as a decoder has it."""
+        assert self._mirror.past is not None
+        return self._mirror.past
 
     def __init__(self, settings: ReferenceSettings) -> None:
         self._settings = settings
         self._encoder: libvpx.Vp9Encoder | None = None
+        self._mirror = Vp9ReferenceDecoder((settings.width, settings.height))
 
     def push(self, planes: Planes, predictions: Sequence[Planes], keyframe: bool) -> bytes:
         """See `ReferenceEncoder`."""
@@ -105,11 +114,18 @@ class Vp9ReferenceEncoder:
         start: list[bytes] = []
         if keyframe or self._encoder is None:
             self._encoder, start = self._started()
+        share = 0
+        if not start:
+            assert self._mirror.past is not None
+            share, first = best_share(predictions[0], self._mirror.past, planes)
+            predictions = [first, *predictions[1:]]
         for place, prediction in zip(_PLACES, predictions, strict=False):
             self._encoder.set_reference(place, _joined(prediction))
         flags = _KEEP | sum(_NOT[len(predictions) :]) | (libvpx.NO_LAST if start else 0)
         frame = self._encoder.encode(_joined(planes), flags)
-        return ReferenceUnit(checksum(predictions), tuple(start), frame).to_bytes()
+        unit = ReferenceUnit(checksum(predictions), tuple(start), frame, share)
+        self._mirror.decode(unit, predictions)
+        return unit.to_bytes()
 
     def _started(self) -> tuple[libvpx.Vp9Encoder, list[bytes]]:
         """A new encoder, and the frames that give its references rooms of their own."""
@@ -128,10 +144,14 @@ class Vp9ReferenceDecoder:
 
     Args:
         size: (width, height) of the pictures as coded, px.
+
+    Attributes:
+        past: the last picture.
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
         self._size = size
+        self.past: Planes | None = None
         self._decoder: libvpx.Vp9Decoder | None = None
 
     def push(self, data: bytes, predictions: Sequence[Planes], keyframe: bool, label: str) -> Planes:
@@ -146,14 +166,17 @@ class Vp9ReferenceDecoder:
                 )
             if not keyframe and self._decoder is None:
                 raise MissingReference(label, "a picture that builds on one that is missing", "a keyframe")
+            if unit.share and self.past is not None:
+                predictions = [Past(predictions[0], self.past).blended(unit.share), *predictions[1:]]
             if unit.checksum != checksum(predictions):
                 found = "a prediction that is not the encoder's"
                 raise MissingReference(label, found, f"checksum {unit.checksum:08x}")
-            return self._decode(unit, predictions)
+            return self.decode(unit, predictions)
         except (libvpx.LibvpxError, NalError) as error:
             raise StreamError(label, f"a damaged picture ({error})", "a VP9 frame") from None
 
-    def _decode(self, unit: ReferenceUnit, predictions: Sequence[Planes]) -> Planes:
+    def decode(self, unit: ReferenceUnit, predictions: Sequence[Planes]) -> Planes:
+        """Decode a unit that is known to fit, with predictions that have the past's share in them."""
         # Should something fail below, only a keyframe can follow.
         decoder, self._decoder = self._decoder, None
         if unit.start:
@@ -166,7 +189,7 @@ class Vp9ReferenceDecoder:
         for place, prediction in zip(_PLACES, predictions, strict=False):
             decoder.set_reference(place, _joined(prediction))
         found = _cropped(decoder.decode(unit.frame), self._size)
-        self._decoder = decoder
+        self._decoder, self.past = decoder, found
         return found
 
 
@@ -232,16 +255,18 @@ class ReferenceUnit:
         checksum: CRC-32 of its predictions.
         start: the grey frames in front of a keyframe; nothing else has any.
         frame: the picture's own.
+        share: of the past in its first prediction, 0 (none)..MOST_SHARE; a keyframe has none.
     """
 
     checksum: int
     start: tuple[bytes, ...]
     frame: bytes
+    share: int = 0
 
     def to_bytes(self) -> bytes:
         """As FORMAT.md has it."""
         start = b"".join(_SIZE.pack(len(each)) + each for each in self.start)
-        return _HEAD.pack(self.checksum, len(self.start)) + start + self.frame
+        return _HEAD.pack(self.checksum, len(self.start) + _SHARE * self.share) + start + self.frame
 
     @classmethod
     def parse(cls, data: bytes) -> ReferenceUnit:
@@ -252,9 +277,12 @@ class ReferenceUnit:
         """
         if len(data) < _HEAD.size:
             raise NalError("it ends too early")
-        value, count = _HEAD.unpack_from(data)
+        value, both = _HEAD.unpack_from(data)
+        share, count = divmod(both, _SHARE)
         if count > MOST_REFERENCES:
             raise NalError(f"{count} frames in front of its own")
+        if share > (0 if count else MOST_SHARE):
+            raise NalError(f"share {share} of the past")
         start, at = [], _HEAD.size
         for _ in range(count):
             size = int.from_bytes(data[at : at + _SIZE.size], "little")
@@ -263,7 +291,7 @@ class ReferenceUnit:
             at += size
         if at >= len(data) or not all(start):
             raise NalError("it ends too early")
-        return cls(value, tuple(start), data[at:])
+        return cls(value, tuple(start), data[at:], share)
 
 
 class ReferenceUnits:
