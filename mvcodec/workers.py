@@ -261,13 +261,12 @@ def run_all(function: Callable[..., Result], *items: Iterable[Any]) -> list[Resu
 
 
 def run_in_bands(length: int, work: Callable[..., object], *arguments: object) -> None:
-    """``work(*arguments, first, last)`` for bands of ``range(length)``; with several threads two for each.
+    """``work(*arguments, first, last)`` for bands of ``range(length)``, one for each thread.
 
-    Wherever they end, the same must come out.
+    Wherever they end, the same must come out. More bands than threads would share out uneven rows better, but
+    a band of a view asks rows beyond its ends, which costs more.
     """
-    threads_here = thread_count()
-    # Some rows are more work than others: who is done with the first band takes another one.
-    count = max(min(threads_here * (2 if threads_here > 1 else 1), length), 1)
+    count = max(min(thread_count(), length), 1)
     edges = [length * band // count for band in range(count + 1)]
     run_all(partial(work, *arguments), edges[:-1], edges[1:])
 
