@@ -20,6 +20,8 @@ from mvcodec.decoding.derived_maps import derive_map
 from mvcodec.frames import DecodedSet, DisparityMap
 from mvcodec.layers.refinement import make_matcher
 from mvcodec.synthesis.synthesizers import make_synthesizer
+from mvcodec.video.codec import Planes
+from mvcodec.video.past import ALL, MOST_SHARE, Past
 
 READ_WRITE, PRIVATE_ANONYMOUS = 3, 0x22
 SIZES = ((1, 1), (17, 5), (16, 16), (33, 2), (75, 46))
@@ -81,7 +83,21 @@ def work(width: int, height: int) -> None:
             make_synthesizer(name).render(decoded, Viewpoint(row, col))
 
 
+def mix(width: int, height: int) -> None:
+    """Mix predictions with pasts that have moved as far as is looked for, and with others."""
+    rng = np.random.default_rng(height)
+    noise = rng.integers(0, 256, (2 * height, 2 * width), dtype=np.uint8)
+    chroma = np.ascontiguousarray(noise[:height, :width])
+    for step in ((24, 24), (-24, 24), (24, -24), (-24, -24), (7, 90)):
+        past = np.ascontiguousarray(np.roll(noise, step, (0, 1)))
+        found = Past(Planes(noise, chroma, chroma), Planes(past, chroma, chroma))
+        for share in range(1, MOST_SHARE + 1):
+            found.blended(share)
+        found.luma(ALL)
+
+
 if __name__ == "__main__":
     guard(low=sys.argv[1] == "low")
     for size in SIZES:
         work(*size)
+        mix(*size)
