@@ -56,36 +56,42 @@ def _sum(parts: Sequence[Lanes]) -> Lanes:
 class _Rows:
     """Loads pixels side by side, so many rows below a place and so many to its right."""
 
-    def __init__(self, builder: Any, plane: Any, place: Any, stride: Any, count: int = COUNT) -> None:
+    def __init__(self, builder: Any, plane: Any, place: Any, stride: Any) -> None:
         self._builder, self._plane, self._place, self._stride = builder, plane, place, stride
-        self._count = count
 
     def __call__(self, down: int, right: int = 0) -> Lanes:
         builder, kind = self._builder, self._place.type
         step = builder.mul(self._stride, ir.Constant(kind, down))
         at = builder.add(builder.add(self._place, step), ir.Constant(kind, right))
-        return loaded(builder, self._plane, at, SHORT, self._count)
+        return loaded(builder, self._plane, at, SHORT)
 
 
 def _unlike(_typing, now, past, places, stride):  # type: ignore[no-untyped-def]
-    """Sum of absolute differences of SMALL x SMALL pixels: int32.
+    """Sums of absolute differences of three windows of SMALL x SMALL pixels, four pixels apart.
 
     Args:
         now, past: int16, flat.
         places: two intp, the first pixel's in both.
         stride: intp, from row to row.
+
+    Returns:
+        three int32.
     """
 
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
         planes = pointers(context, builder, signature, values, 2)
         one, other = (
-            _Rows(builder, plane, place, values[3], SMALL)
+            _Rows(builder, plane, place, values[3])
             for plane, place in zip(planes, split(builder, values[2], 2), strict=True)
         )
         apart = _sum([_size(one(row) - other(row)) for row in range(SMALL)])
-        return builder.sext(_total(apart), WORD)
+        pairs = dot(apart, constant(builder, SHORT, [1] * COUNT))
+        fours = shuffled(pairs, pairs, range(0, 8, 2)) + shuffled(pairs, pairs, range(1, 8, 2))
+        sums = fours + shuffled(fours, fours, [1, 2, 3, 0])
+        found = [builder.extract_element(sums.value, ir.Constant(WORD, lane)) for lane in range(3)]
+        return context.make_tuple(builder, signature.return_type, found)
 
-    return types.int32(now, past, places, stride), generate
+    return types.UniTuple(types.int32, 3)(now, past, places, stride), generate
 
 
 def _slopes(_typing, now, past, places, stride, beyond):  # type: ignore[no-untyped-def]

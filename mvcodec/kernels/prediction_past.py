@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvcodec.kernels.lanes import COUNT
-from mvcodec.kernels.past_blocks import SMALL, blend_block, slopes, unlike
+from mvcodec.kernels.past_blocks import blend_block, slopes, unlike
 
 Plane = NDArray[np.uint8]
 Padded = NDArray[np.int16]
@@ -76,19 +76,25 @@ def search(now: Padded, past: Padded, motion: Motion, first: int, last: int) -> 
         now, past: padded, of quarter size.
         motion: int32 (blocks down, blocks across, 2), (y, x) in FINE-ths, overwritten.
     """
-    side, stride = BLOCK >> (LEVELS - 1), now.shape[1]
-    here, there = now.ravel(), past.ravel()
+    stride, here, there = now.shape[1], now.ravel(), past.ravel()
+    best = np.empty(motion.shape[1] + 2, np.int32)
     for row in range(first, last):
-        for col in range(motion.shape[1]):
-            place = (PAD + row * side + (side - SMALL) // 2) * stride + PAD + col * side + (side - SMALL) // 2
-            best, found_y, found_x = unlike(here, there, (place, place), stride), 0, 0
-            for down in range(-REACH, REACH + 1):
-                for right in range(-REACH, REACH + 1):
-                    cost = unlike(here, there, (place, place + down * stride + right), stride)
-                    cost += np.int32(MOTION_COST * (abs(down) + abs(right)))
-                    if cost < best:
-                        best, found_y, found_x = cost, down, right
-            motion[row, col, 0], motion[row, col, 1] = FINE * found_y, FINE * found_x
+        line = (PAD + 4 * row - 2) * stride + PAD - 2
+        for col in range(0, motion.shape[1], 3):
+            place = line + 4 * col
+            best[col], best[col + 1], best[col + 2] = unlike(here, there, (place, place), stride)
+        motion[row] = 0
+        for down in range(-REACH, REACH + 1):
+            for right in range(-REACH, REACH + 1):
+                way, dear = down * stride + right, np.int32(MOTION_COST * (abs(down) + abs(right)))
+                for col in range(0, motion.shape[1], 3):
+                    place = line + 4 * col
+                    three = unlike(here, there, (place, place + way), stride)
+                    for k in range(3):
+                        if three[k] + dear < best[col + k]:
+                            best[col + k] = three[k] + dear
+                            if col + k < motion.shape[1]:
+                                motion[row, col + k, 0], motion[row, col + k, 1] = FINE * down, FINE * right
 
 
 @njit(cache=True, nogil=True)
@@ -179,31 +185,28 @@ def blend_chroma(
     Args:
         now, past: padded planes.
         motion, shares: as `blend` has them.
-        chroma: uint8 (H / 2, W / 2), overwritten.
+        chroma: uint8 (BLOCK / 2 * blocks down, BLOCK / 2 * blocks across), overwritten.
     """
-    height, width = chroma.shape
     side, half = BLOCK // 2, BLOCK // 4
     for row in range(first, last):
         for col in range(motion.shape[1]):
-            y, x = side * row, side * col
             down, right = (motion[row, col, 0] + 1) >> 1, (motion[row, col, 1] + 1) >> 1
-            top, left = y + PAD + (down >> 4), x + PAD + (right >> 4)
+            top, left = side * row + PAD + (down >> 4), side * col + PAD + (right >> 4)
             low, far = np.int32(down & 15), np.int32(right & 15)
             high, near = np.int32(16) - low, np.int32(16) - far
-            for i in range(min(side, height - y)):
-                own, line = now[y + i + PAD, x + PAD : x + PAD + side], chroma[y + i]
+            for i in range(side):
+                one, other = shares[2 * row + i // half, 2 * col], shares[2 * row + i // half, 2 * col + 1]
+                own = now[side * row + i + PAD, side * col + PAD : side * col + PAD + side]
                 upper, lower = (
                     past[top + i, left : left + side + 1],
                     past[top + i + 1, left : left + side + 1],
                 )
-                for j in range(min(side, width - x)):
-                    share, value = (
-                        shares[2 * row + i // half, 2 * col + j // half],
-                        np.int32(own[j]) << np.int32(6),
-                    )
-                    if share:
-                        above = near * np.int32(upper[j]) + far * np.int32(upper[j + 1])
-                        below = near * np.int32(lower[j]) + far * np.int32(lower[j + 1])
-                        fetched = (high * above + low * below + np.int32(2)) >> np.int32(2)
-                        value += (share * (fetched - value) + np.int32(32)) >> np.int32(6)
-                    line[x + j] = np.uint8((value + np.int32(32)) >> np.int32(6))
+                line = chroma[side * row + i, side * col : side * col + side]
+                for j in range(side):  # vectorised
+                    above = near * np.int32(upper[j]) + far * np.int32(upper[j + 1])
+                    below = near * np.int32(lower[j]) + far * np.int32(lower[j + 1])
+                    fetched = (high * above + low * below + np.int32(2)) >> np.int32(2)
+                    value = np.int32(own[j]) << np.int32(6)
+                    share = one if j < half else other
+                    value += (share * (fetched - value) + np.int32(32)) >> np.int32(6)
+                    line[j] = np.uint8((value + np.int32(32)) >> np.int32(6))

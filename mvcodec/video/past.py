@@ -86,16 +86,15 @@ class Past:
 
     def blended(self, share: int) -> Planes:
         """The prediction with a share of the past, 1 (least)..MOST_SHARE."""
-        from mvcodec.kernels.prediction_past import blend_chroma
+        from mvcodec.kernels.prediction_past import BLOCK, blend_chroma
 
         y, shares = self.luma(SHARES[share - 1])
-        rows = len(self._motion)
+        rows, columns, _ = self._motion.shape
         chroma = []
         for plane, earlier in ((self._prediction.u, self._past.u), (self._prediction.v, self._past.v)):
-            chroma.append(np.empty_like(plane))
-            run_in_bands(
-                rows, blend_chroma, _padded(plane), _padded(earlier), self._motion, shares, chroma[-1]
-            )
+            out = np.empty((BLOCK // 2 * rows, BLOCK // 2 * columns), np.uint8)
+            run_in_bands(rows, blend_chroma, _padded(plane), _padded(earlier), self._motion, shares, out)
+            chroma.append(np.ascontiguousarray(out[: plane.shape[0], : plane.shape[1]]))
         return Planes(y, *chroma)
 
 
