@@ -194,6 +194,45 @@ def _blend_block(_typing, now, past, luma, places, strides, across, along, share
     return types.UniTuple(types.int32, 4)(*kinds), generate
 
 
+def _blend_samples(_typing, now, past, chroma, places, strides, beyond, shares):  # type: ignore[no-untyped-def]
+    """A block's chroma with its share of the past: eight by eight samples of one plane.
+
+    Args:
+        now, past: int16, flat.
+        chroma: uint8, flat, overwritten.
+        places: three intp, the first sample's in each.
+        strides: two intp, from row to row: of the planes; of chroma.
+        beyond: two int32, 0..15, as `slopes`.
+        shares: four int32, of each quarter in 64ths, row by row.
+    """
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        now, past, chroma = pointers(context, builder, signature, values, 3)
+        here, there, out = split(builder, values[3], 3)
+        stride, step = split(builder, values[4], 2)
+        own, other = _Rows(builder, now, here, stride), _Rows(builder, past, there, stride)
+        down, right = (filled(builder, part) for part in split(builder, values[5], 2))
+        up, left = down * -1 + 16, right * -1 + 16
+        four = [filled(builder, share) for share in split(builder, values[6], 4)]
+        half, side = COUNT // 4, COUNT // 2
+        order = [*range(half), *range(COUNT, COUNT + COUNT - half)]
+        lines = [other(row).to_words() * left + other(row, 1).to_words() * right for row in range(side + 1)]
+        for row in range(side):
+            first = row // half * 2
+            share = shuffled(four[first], four[first + 1], order)
+            grey = own(row).to_words() << 6
+            fetched = (lines[row] * up + lines[row + 1] * down + 2) >> 2
+            value = grey + ((share * (fetched - grey) + 32) >> 6)
+            found = ((value + 32) >> 6).to_bytes()
+            at = builder.add(out, builder.mul(step, ir.Constant(step.type, row)))
+            store(shuffled(found, found, range(side)), chroma, at)
+        return context.get_dummy_value()
+
+    kinds = now, past, chroma, places, strides, beyond, shares
+    return types.void(*kinds), generate
+
+
 unlike: Any = intrinsic(_unlike)
 slopes: Any = intrinsic(_slopes)
 blend_block: Any = intrinsic(_blend_block)
+blend_samples: Any = intrinsic(_blend_samples)

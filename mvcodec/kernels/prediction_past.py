@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvcodec.kernels.lanes import COUNT
-from mvcodec.kernels.past_blocks import blend_block, slopes, unlike
+from mvcodec.kernels.past_blocks import blend_block, blend_samples, slopes, unlike
 
 Plane = NDArray[np.uint8]
 Padded = NDArray[np.int16]
@@ -187,26 +187,14 @@ def blend_chroma(
         motion, shares: as `blend` has them.
         chroma: uint8 (BLOCK / 2 * blocks down, BLOCK / 2 * blocks across), overwritten.
     """
-    side, half = BLOCK // 2, BLOCK // 4
+    side, strides = BLOCK // 2, (now.shape[1], chroma.shape[1])
+    here, there, out = now.ravel(), past.ravel(), chroma.ravel()
     for row in range(first, last):
         for col in range(motion.shape[1]):
             down, right = (motion[row, col, 0] + 1) >> 1, (motion[row, col, 1] + 1) >> 1
-            top, left = side * row + PAD + (down >> 4), side * col + PAD + (right >> 4)
-            low, far = np.int32(down & 15), np.int32(right & 15)
-            high, near = np.int32(16) - low, np.int32(16) - far
-            for i in range(side):
-                one, other = shares[2 * row + i // half, 2 * col], shares[2 * row + i // half, 2 * col + 1]
-                own = now[side * row + i + PAD, side * col + PAD : side * col + PAD + side]
-                upper, lower = (
-                    past[top + i, left : left + side + 1],
-                    past[top + i + 1, left : left + side + 1],
-                )
-                line = chroma[side * row + i, side * col : side * col + side]
-                for j in range(side):  # vectorised
-                    above = near * np.int32(upper[j]) + far * np.int32(upper[j + 1])
-                    below = near * np.int32(lower[j]) + far * np.int32(lower[j + 1])
-                    fetched = (high * above + low * below + np.int32(2)) >> np.int32(2)
-                    value = np.int32(own[j]) << np.int32(6)
-                    share = one if j < half else other
-                    value += (share * (fetched - value) + np.int32(32)) >> np.int32(6)
-                    line[j] = np.uint8((value + np.int32(32)) >> np.int32(6))
+            place, at = (side * row + PAD) * strides[0] + side * col + PAD, side * (row * strides[1] + col)
+            places = place, place + (down >> 4) * strides[0] + (right >> 4), at
+            beyond = np.int32(down & 15), np.int32(right & 15)
+            above, below = shares[2 * row], shares[2 * row + 1]
+            four = above[2 * col], above[2 * col + 1], below[2 * col], below[2 * col + 1]
+            blend_samples(here, there, out, places, strides, beyond, four)
