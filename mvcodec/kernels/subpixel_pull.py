@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from llvmlite import ir
+from numba import njit, types  # Numba as a whole first: half of it fails while another thread imports it
+from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from mvcodec.kernels.lanes import COUNT, FLOAT, WORD, constant, filled, loaded, store
+from mvcodec.kernels.runs import pointers
 
 FloatMap = NDArray[np.float32]
 
@@ -27,8 +32,8 @@ def _cubic(before, here, after, beyond, t):  # type: ignore[no-untyped-def]
     return w_before * before + w_here * here + w_after * after + w_beyond * beyond
 
 
-RUN = 16
-"""Neighbours that are fetched at once where the partner's are neighbours too."""
+RUN = COUNT
+"""Neighbours that are fetched at once where the partner's are neighbours too, but for steps of one."""
 NOWHERE = np.int32(-1)
 
 
@@ -44,26 +49,69 @@ def _places(disparity, first, along, by, last, whole, parts, further):  # type: 
         further[x] = np.int32(np.rint(place)) - at if inside else NOWHERE
 
 
-@njit(cache=True, nogil=True)
-def _is_run(whole, start, along):  # type: ignore[no-untyped-def]
-    """Whether RUN pixels are seen side by side."""
-    differ = np.int32(0)
-    for k in range(np.uint64(RUN)):
-        differ |= (whole[start + k] - along * np.int32(k)) ^ whole[start]
-    return differ == 0
+@intrinsic
+def _spread(_typing, whole, apart, start, along):  # type: ignore[no-untyped-def]
+    """Which of RUN pixels are seen one further than side by side, and where the first of the others would be.
+
+    Args:
+        whole, apart: int32, of a row; `apart` is written.
+        start: intp, the first of them; along: int32, 1 along rows, else 0.
+
+    Returns:
+        int32, -1 where they are further apart than that.
+    """
+    arguments = whole, apart, start, along
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        whole, apart = pointers(context, builder, signature, values, 2)
+        start, along = values[2:]
+        first = builder.load(builder.gep(whole, [start]))
+        lanes = constant(builder, WORD, range(COUNT)) * filled(builder, along)
+        off = loaded(builder, whole, start, WORD) - lanes - filled(builder, first)
+        none = ir.Constant(ir.IntType(COUNT), -1)
+        further, nearer = (
+            builder.icmp_unsigned("==", (off.is_("==", 0) | off.is_("==", other)).bits(), none)
+            for other in (1, -1)
+        )
+        least = builder.select(further, first, builder.sub(first, ir.Constant(WORD, 1)))
+        store(off + filled(builder, first) - filled(builder, least), apart, start)
+        return builder.select(builder.or_(further, nearer), least, ir.Constant(WORD, -1))
+
+    return types.int32(*arguments), generate
 
 
-@njit(cache=True, nogil=True)
-def _copy(source, begin, out, there):  # type: ignore[no-untyped-def]
-    for k in range(np.uint64(RUN)):
-        out[there + k] = source[begin + k]
+@intrinsic
+def _fetch(_typing, source, apart, out, begin, stride, there):  # type: ignore[no-untyped-def]
+    """RUN pixels of a plane from `begin` on, or those `stride` further where they are apart; all intp."""
+    arguments = source, apart, out, begin, stride, there
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        source, apart, out = pointers(context, builder, signature, values, 3)
+        begin, stride, there = values[3:]
+        one, two = (loaded(builder, source, at, FLOAT) for at in (begin, builder.add(begin, stride)))
+        store(two.where(loaded(builder, apart, there, WORD).is_(">", 0), one), out, there)
+        return context.get_dummy_value()
+
+    return types.void(*arguments), generate
 
 
-@njit(cache=True, nogil=True)
-def _copy_nearer(source, begin, stride, further, out, there):  # type: ignore[no-untyped-def]
-    for k in range(np.uint64(RUN)):
-        one, two = source[begin + k], source[begin + stride + k]
-        out[there + k] = two if further[there + k] > 0 else one
+@intrinsic
+def _fetch_nearest(_typing, source, apart, further, out, begin, stride, there):  # type: ignore[no-untyped-def]
+    """The same of the nearest pixels, which may be another one further."""
+    arguments = source, apart, further, out, begin, stride, there
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        source, apart, further, out = pointers(context, builder, signature, values, 4)
+        begin, stride, there = values[4:]
+        second = builder.add(begin, stride)
+        places = begin, second, builder.add(second, stride)
+        one, two, three = (loaded(builder, source, at, FLOAT) for at in places)
+        beyond = loaded(builder, further, there, WORD)
+        off = loaded(builder, apart, there, WORD) + beyond.where(beyond.is_(">", 0))
+        store(three.where(off.is_(">", 1), two.where(off.is_(">", 0), one)), out, there)
+        return context.get_dummy_value()
+
+    return types.void(*arguments), generate
 
 
 @njit(cache=True, nogil=True)
@@ -126,30 +174,28 @@ def add_pull(
     by, along = np.float32(step), np.int32(1 if along_rows else 0)
     flat_grey, flat_slope = other_grey.reshape(-1), other_slope.reshape(-1)
     flat_there = other_disparity.reshape(-1)
-    # Rows of one array would not be told apart: then nothing is vectorised.
-    whole, further = np.empty(width, np.int32), np.empty(width, np.int32)
+    # Each by itself: rows of one array are not told apart, and nothing is vectorised then.
+    whole, further, apart = np.empty(width, np.int32), np.empty(width, np.int32), np.empty(width, np.int32)
     parts, residuals = np.empty(width, np.float32), np.empty(width, np.float32)
     trusted, there = np.empty(width, np.float32), np.empty(width, np.float32)
     before, here = np.empty(width, np.float32), np.empty(width, np.float32)
     after, beyond = np.empty(width, np.float32), np.empty(width, np.float32)
     slopes, next_slopes = np.empty(width, np.float32), np.empty(width, np.float32)
-    by_one, scale, near = np.uint64(stride), np.float32(1 / grey_scale), np.float32(same_surface)
+    scale, near = np.float32(1 / grey_scale), np.float32(same_surface)
     for y in range(height):
         row = np.int32(0 if along_rows else y)
         _places(disparity[y], row, along, by, np.float32(last), whole, parts, further)
         for start in range(0, width, RUN):
-            first = np.int64(whole[start])
-            inside = start + RUN <= width and first >= 1 and first + (RUN - 1) * along + 2 <= last
-            if inside and _is_run(whole, np.uint64(start), along):
-                out = np.uint64(start)
-                begin = np.uint64(y * width + first if along_rows else first * width + start)
-                _copy(flat_grey, begin - by_one, before, out)
-                _copy(flat_grey, begin, here, out)
-                _copy(flat_grey, begin + by_one, after, out)
-                _copy(flat_grey, begin + by_one + by_one, beyond, out)
-                _copy(flat_slope, begin, slopes, out)
-                _copy(flat_slope, begin + by_one, next_slopes, out)
-                _copy_nearer(flat_there, begin, by_one, further, there, out)
+            least = np.int64(_spread(whole, apart, start, along)) if start + RUN <= width else np.int64(-1)
+            if least >= 1 and least + RUN * along + 3 <= last:
+                begin = y * width + least if along_rows else least * width + start
+                _fetch(flat_grey, apart, before, begin - stride, stride, start)
+                _fetch(flat_grey, apart, here, begin, stride, start)
+                _fetch(flat_grey, apart, after, begin + stride, stride, start)
+                _fetch(flat_grey, apart, beyond, begin + 2 * stride, stride, start)
+                _fetch(flat_slope, apart, slopes, begin, stride, start)
+                _fetch(flat_slope, apart, next_slopes, begin + stride, stride, start)
+                _fetch_nearest(flat_there, apart, further, there, begin, stride, start)
                 continue
             for k in range(min(RUN, width - start)):
                 x = start + k

@@ -76,7 +76,7 @@ def look_again(
             steps(array, camera, others[camera]),
             BEHIND_PX,
         )
-        filled = fill_from_farther(values, ~wrong, range_px[0])
+        filled = np.minimum(values, fill_from_farther(values, ~wrong, range_px[0]))
         limits = settings.tolerance_px, settings.thin_px
         smooth = median_but_thin(filled, kept[camera], MEDIAN_SIZE, limits, range_px)
         return DisparityMap(smooth, kept[camera] | maps[camera].valid)
