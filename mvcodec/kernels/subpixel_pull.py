@@ -186,10 +186,10 @@ def add_pull(
         row = np.int32(0 if along_rows else y)
         _places(disparity[y], row, along, by, np.float32(last), whole, parts, further)
         for start in range(0, width, RUN):
-            least = np.int64(_spread(whole, apart, start, along)) if start + RUN <= width else np.int64(-1)
+            least = np.int64(_spread(whole, apart, start, along)) if start + RUN <= width else np.int64(-1)  # type: ignore[call-arg]
             if least >= 1 and least + RUN * along + 3 <= last:
                 begin = y * width + least if along_rows else least * width + start
-                _fetch(flat_grey, apart, before, begin - stride, stride, start)
+                _fetch(flat_grey, apart, before, begin - stride, stride, start)  # type: ignore[call-arg]
                 _fetch(flat_grey, apart, here, begin, stride, start)
                 _fetch(flat_grey, apart, after, begin + stride, stride, start)
                 _fetch(flat_grey, apart, beyond, begin + 2 * stride, stride, start)
