@@ -36,7 +36,7 @@ guesses; trials replace the last two."""
 PRICE = 0.55
 """Natural logarithm of the bits for a decibel that a finer layer brings; a first guess."""
 
-ABOUT, NEAR, CLOSE = 1.0, 0.15, 0.03
+ABOUT, NEAR, CLOSE = 1.0, 0.15, 0.015
 """dB from the target: of the first trial of which bases are compared, of trials that the slopes bring to the
 target, and of the result, which is above it."""
 
@@ -46,8 +46,8 @@ LEAST_GAIN = 0.002
 COARSER_MAPS = 5
 """QPs, on libx264's scale, by which maps are tried coarser than their model has them."""
 
-LEAST_STEP, DIGITS = 0.1, 2
-"""QPs of the layer: the least change, and the decimals that are kept."""
+FINER_STEP, LEAST_STEP, DIGITS = 0.1, 0.05, 2
+"""QPs of the layer: the least change to a finer one, the least between two, and the decimals that are kept."""
 
 MOST_CHANGE = 2.5
 """A slope changes by no greater factor at a time."""
@@ -329,7 +329,7 @@ class _Search:
                 if qp < _layer_qp(reached) + LEAST_STEP:
                     break
             elif missed is not None:
-                qp = min(qp, _layer_qp(missed) - LEAST_STEP)
+                qp = min(qp, _layer_qp(missed) - FINER_STEP)
             qp = self._layer_within(qp)
             trial = self._check(replace(probe.config, enhance=qp))
             gap = self._target + CLOSE / 2 - trial.psnr_y

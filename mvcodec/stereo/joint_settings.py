@@ -141,7 +141,7 @@ SMALL_CENSUS: dict[str, Any] = {
 BALANCED: dict[str, Any] = {
     **SMALL_CENSUS,
     "median_size": 3,
-    "search_share": 0.25,
+    "search_share": 0.15,
     "subpixel_steps": 0,
     "full_size_steps": 1,
 }
