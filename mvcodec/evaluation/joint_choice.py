@@ -47,7 +47,7 @@ COARSER_MAPS = 5
 """QPs, on libx264's scale, by which maps are tried coarser than their model has them."""
 
 FINER_STEP, LEAST_STEP, DIGITS = 0.1, 0.05, 2
-"""QPs of the layer: the least change to a finer one, the least between two, and the decimals that are kept."""
+"""QPs of the layer: least change to a finer one, the least between two, and the decimals that are kept."""
 
 MOST_CHANGE = 2.5
 """A slope changes by no greater factor at a time."""
