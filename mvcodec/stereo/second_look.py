@@ -7,8 +7,9 @@ stands there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,12 +103,9 @@ def _searched(
         windows = np.clip(places - BORDER, 0, [array.height - WINDOW, array.width])
         compare = comparison(array, those, views, low, settings)
 
-        def costs_of(first: int, costs: NDArray[np.uint8], windows=windows, compare=compare) -> None:  # type: ignore[no-untyped-def]
-            compare(windows + np.array([first, 0]), costs)
-
         with pool.lend() as scratch:
             side_by_side = decide(
-                costs_of,
+                partial(_costs_of_rows, compare, windows),
                 _beside_each_other(grey, windows),
                 low,
                 high - low + 1,
@@ -117,6 +115,15 @@ def _searched(
             )
         _put_back(np.clip(side_by_side.disparity, *range_px), places, windows, found, searched)
     return found, searched
+
+
+def _costs_of_rows(
+    compare: Callable[[Places, NDArray[np.uint8]], None],
+    windows: Places,
+    first: int,
+    costs: NDArray[np.uint8],
+) -> None:
+    compare(windows + np.array([first, 0]), costs)
 
 
 def _in_parts(blocks: Blocks) -> Iterator[tuple[Places, tuple[int, int]]]:
