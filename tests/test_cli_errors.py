@@ -147,6 +147,12 @@ def test_options_without_effect_are_refused(array: Path, tmp_path: Path, option:
     assert not (tmp_path / "o.mcap").exists()
 
 
+def test_a_second_reference_of_nothing_that_is_predicted_is_refused(array: Path, tmp_path: Path) -> None:
+    line = fails(2, "encode", array, tmp_path / "o.mcap", "--second-reference", "nearest")
+    assert line.startswith("mvcodec: error: --second-reference: found nearest, expected prediction synthesis")
+    assert not (tmp_path / "o.mcap").exists()
+
+
 def test_json_and_the_stream_cannot_both_be_standard_output(array: Path, coded: Path) -> None:
     assert "--json: found with OUT -" in fails(2, "encode", array, "-", "--json")
     assert "--json: found with OUT -" in fails(2, "decode", coded, "-", "--format", "mcap", "--json")

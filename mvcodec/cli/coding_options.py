@@ -131,6 +131,9 @@ def checked_config(array: CameraArray, arguments: argparse.Namespace, **others: 
     config = EncoderConfig(
         **{name: getattr(arguments, name) for name in CODING}, speed=arguments.speed or FOR_FILES, **others
     )
+    if config.chosen_second_reference != "none" and config.prediction == "none" and config.enhance is None:
+        expected = "prediction synthesis or enhance beside it: nothing else is predicted"
+        raise SettingError("second_reference", config.second_reference, expected)
     Encoder(array, config).flush()
     return config
 
